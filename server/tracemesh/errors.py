@@ -1,0 +1,48 @@
+"""Every exception that tracemesh raises on purpose.
+
+    TracemeshError
+├── InputError            a file or message that cannot be read: says where, what was wanted, what came
+├── ScanError             readable, but no network can be reconstructed from it: names the curve
+│   └── NetworkError      the curves do not form the cell complex that a surface needs: names the segment
+├── SurfaceError          no valid mesh can be spanned over a network
+├── Cancelled             somebody asked for the work to stop
+└── ResourceError         what a request to the service names or asks for cannot be had
+    ├── NotFound
+    └── Conflict
+"""
+
+
+class TracemeshError(Exception):
+    """Base of all errors whose message is meant for the person in front of the screen."""
+
+
+class InputError(TracemeshError):
+    """A file or message that cannot be read; the message says where, what was wanted and what came."""
+
+
+class ScanError(TracemeshError):
+    """A scan from which no network can be reconstructed; the message names the curve and the reason."""
+
+
+class NetworkError(ScanError):
+    """Curves that do not form a cell complex; the message names the segment and what would mend it."""
+
+
+class SurfaceError(TracemeshError):
+    """A network over which no valid mesh can be spanned; the message names the patch."""
+
+
+class Cancelled(TracemeshError):  # noqa: N818 - not a failure
+    """Somebody asked for the work to stop."""
+
+
+class ResourceError(TracemeshError):
+    """What a request to the service names or asks for cannot be had."""
+
+
+class NotFound(ResourceError):  # noqa: N818 - HTTP's own words
+    """Nothing has this name."""
+
+
+class Conflict(ResourceError):  # noqa: N818 - HTTP's own words
+    """The state of the resource does not allow it."""

@@ -1,0 +1,1 @@
+"""Files in and out. Axis and unit changes happen here, nowhere else."""

@@ -1,0 +1,1 @@
+"""The numerical kernel: arrays in, arrays out; nothing of files, networks or the web."""

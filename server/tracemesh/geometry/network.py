@@ -1,0 +1,41 @@
+"""The reconstructed curve network: the interface between the curve half and the surface half of the kernel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A polyline between two nodes.
+
+    points: (k,) indices into the network's points; first and last are nodes; a closed curve without nodes repeats its
+    first point last. boundary: one face beside it, not two. curve: index of the scanned curve that it is a part of.
+    """
+
+    points: Ints
+    boundary: bool
+    curve: int
+
+
+@dataclass(frozen=True)
+class CurveNetwork:
+    """Curves on a surface that meet in nodes.
+
+    points: (n, 3) m, world; every point once, nodes included. normals: (n, 3) outward unit surface normals.
+    nodes: (k,) indices of the points that are nodes. segments: the polylines between them.
+    """
+
+    points: Floats
+    normals: Floats
+    nodes: Ints
+    segments: tuple[Segment, ...]
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal, m."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))

@@ -1,0 +1,1 @@
+"""Sessions, recordings and artifacts at rest."""

@@ -1,0 +1,21 @@
+"""What all messages share."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+PROTOCOL_VERSION = 1
+"""Version of the device protocol that this code speaks."""
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+"""[w, x, y, z], device to world (ENU)."""
+Count = Annotated[int, Field(ge=0, le=2**53 - 1)]
+Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+"""Chosen by whoever creates the thing; safe in a URL and in a file name."""
+
+
+class Message(BaseModel):
+    """A frozen message that refuses fields it does not know and numbers that are not finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -1,0 +1,105 @@
+"""Bodies of the REST API under /api/v1; every length in metres, every time in seconds."""
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from tracemesh.wire.base import Count, Identifier, Message, Vector
+
+
+class SessionCreate(Message):
+    """POST /sessions."""
+
+    id: Identifier | None = Field(default=None, description="chosen by the caller; none: the server chooses")
+    name: str = Field(default="", max_length=200)
+
+
+class SessionUpdate(Message):
+    """PATCH /sessions/{session}; absent fields stay."""
+
+    name: str | None = Field(default=None, max_length=200)
+
+
+class Session(Message):
+    """One object being scanned."""
+
+    id: Identifier
+    name: str
+    created: datetime
+    curves: Count
+    samples: Count
+    nodes: Count = Field(description="distinct node numbers marked")
+    latest_reconstruction: Identifier | None = Field(default=None, description="newest one that is done")
+
+
+class Mark(Message):
+    """A node marked on a curve."""
+
+    sample: Count
+    node: Count
+
+
+class Curve(Message):
+    """One scanned curve of a session."""
+
+    index: Count = Field(description="number within the session, in order of scanning")
+    recording: Identifier
+    boundary: bool
+    closed: bool
+    ended: bool
+    samples: Count
+    length: float = Field(ge=0, description="m, as the odometer saw it")
+    marks: list[Mark]
+
+
+class ReconstructionParameters(Message):
+    """What a person may choose; everything left out is chosen automatically and reported."""
+
+    step: str = Field(
+        default="1.6%",
+        pattern=r"^\d+(\.\d+)?(e-?\d+)?%?$",
+        description="distance of the network's points: % of the estimated diagonal, or m",
+    )
+    stretch: float | None = Field(default=None, ge=0, description="smoothing length of the stretch term, m")
+    bend: float | None = Field(default=None, ge=0, description="smoothing length of the bend term, m")
+    weights: Literal["auto", "thesis"] = "auto"
+    curve_bias: Literal["auto", "on", "off"] = "auto"
+    soft: bool = Field(default=False, description="let the surface leave a noisy network a little")
+    surface: bool = Field(default=True, description="also span the surface, not only the network")
+
+
+JobState = Literal["queued", "running", "done", "failed", "cancelled"]
+
+
+class Reconstruction(Message):
+    """A reconstruction of a session: a job, and its results once it is done."""
+
+    id: Identifier
+    session: Identifier
+    state: JobState
+    stage: str = Field(default="", description="what is being done, in words")
+    fraction: float = Field(default=0.0, ge=0, le=1)
+    error: str | None = Field(default=None, description="why it failed, in words for people")
+    parameters: ReconstructionParameters
+    created: datetime
+    finished: datetime | None = None
+    artifacts: dict[str, str] = Field(default={}, description="file name -> URL: network.json, mesh.glb, report.json")
+
+
+class Problem(Message):
+    """RFC 9457 problem details: the one error envelope of the API."""
+
+    type: str = "about:blank"
+    title: str
+    status: int
+    detail: str = ""
+    instance: str = ""
+    errors: list[dict[str, object]] = Field(default=[], description="per field: where, what was wanted, what came")
+
+
+class NodePosition(Message):
+    """Where a node is, as far as known."""
+
+    node: Count
+    position: Vector
