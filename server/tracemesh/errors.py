@@ -1,6 +1,6 @@
 """Every exception that tracemesh raises on purpose.
 
-    TracemeshError
+TracemeshError
 ├── InputError            a file or message that cannot be read: says where, what was wanted, what came
 ├── ScanError             readable, but no network can be reconstructed from it: names the curve
 │   └── NetworkError      the curves do not form the cell complex that a surface needs: names the segment
