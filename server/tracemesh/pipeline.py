@@ -1,9 +1,13 @@
 """The whole way from a scan to a network and its surface: pure, reports its progress, can be stopped between stages."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import version
 from time import perf_counter
 
+from tracemesh.formats.meshes import write_mesh
+from tracemesh.formats.networks import write_network
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
@@ -26,6 +30,20 @@ class Reconstruction:
     mesh: Mesh | None
     report: dict[str, object]
 
+    def mesh_file(self, extension: str = "glb") -> bytes:
+        """The mesh as a file of this extension; GLB also holds the network and where it all comes from."""
+        if self.mesh is None:
+            raise ValueError("wanted a reconstruction with a surface, got one of the network only")
+        return write_mesh(self.mesh, extension, self.network, {"generator": self.report["generator"]})
+
+    def network_file(self) -> bytes:
+        """The curve network as network JSON."""
+        return write_network(self.network).encode()
+
+    def report_file(self) -> bytes:
+        """Stage times (s), sizes, parameters used, residuals, quality and warnings as JSON."""
+        return (json.dumps(self.report, indent=1) + "\n").encode()
+
 
 def reconstruct(
     scan: Scan, parameters: ReconstructionParameters | None = None, progress: Progress | None = None
@@ -39,7 +57,7 @@ def reconstruct(
     report = progress or _silent
     begin = perf_counter()
     curves = reconstruct_network(scan, network_parameters(parameters), _part(report, 0.0, NETWORK_SHARE))
-    result = Reconstruction(curves.network, None, {"network": curves.report})
+    result = Reconstruction(curves.network, None, {"generator": _generator(), "network": curves.report})
     if parameters.surface:
         result = _with_surface(result, SurfaceParameters(soft=parameters.soft), _part(report, NETWORK_SHARE, 1.0))
     result.report["seconds"] = perf_counter() - begin
@@ -50,7 +68,9 @@ def reconstruct(
 def span(network: CurveNetwork, progress: Progress | None = None) -> Reconstruction:
     """Surface over a network that is known already; raises NetworkError or SurfaceError."""
     begin = perf_counter()
-    result = _with_surface(Reconstruction(network, None, {}), SurfaceParameters(), progress or _silent)
+    result = _with_surface(
+        Reconstruction(network, None, {"generator": _generator()}), SurfaceParameters(), progress or _silent
+    )
     result.report["seconds"] = perf_counter() - begin
     return result
 
@@ -72,6 +92,10 @@ def network_parameters(parameters: ReconstructionParameters) -> NetworkParameter
 def _with_surface(before: Reconstruction, parameters: SurfaceParameters, progress: Progress) -> Reconstruction:
     spanned = span_surface(before.network, parameters, progress)
     return Reconstruction(before.network, spanned.mesh, {**before.report, "surface": spanned.report})
+
+
+def _generator() -> str:
+    return f"tracemesh {version('tracemesh')}"
 
 
 def _part(progress: Progress, start: float, end: float) -> Progress:

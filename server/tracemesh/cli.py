@@ -1,0 +1,252 @@
+"""The command line: arguments in, files out. Messages go to stderr, data to stdout.
+
+Exit status: 0 done; 1 the input cannot be reconstructed (says why and where); 2 usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from tracemesh.errors import TracemeshError
+from tracemesh.files import read_bytes, read_text, write_all
+from tracemesh.terminal import ProgressLine
+from tracemesh.wire.resources import ReconstructionParameters
+
+if TYPE_CHECKING:
+    from tracemesh.pipeline import Reconstruction
+
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+MESH_FORMATS = ("glb", "obj", "ply", "stl")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point of `tracemesh`; never returns."""
+    parser = build_parser()
+    chosen = parser.parse_args(arguments)
+    command: Callable[[argparse.Namespace], int] = chosen.command
+    try:
+        status = command(chosen)
+    except (TracemeshError, OSError) as error:
+        print(f"tracemesh: {error}", file=sys.stderr)
+        status = 1
+    except ValidationError as error:
+        parser.error("; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()))
+    except KeyboardInterrupt:
+        status = 130
+    sys.exit(status)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole grammar; docs/cli.md names every option of it."""
+    parser = argparse.ArgumentParser(
+        prog="tracemesh",
+        description="Curve networks and surfaces from orientations measured along curves.",
+        epilog="First steps:  tracemesh demo   |   tracemesh simulate leaf -o leaf.rawnet && "
+        "tracemesh reconstruct leaf.rawnet -o leaf.glb",
+    )
+    parser.add_argument("--version", action="version", version=f"tracemesh {version('tracemesh')}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for add in (_add_reconstruct, _add_surface, _add_evaluate, _add_simulate, _add_serve, _add_demo):
+        add(commands)
+    return parser
+
+
+def _add_reconstruct(commands: Commands) -> None:
+    parser = commands.add_parser(
+        "reconstruct",
+        help="scan -> curve network -> surface",
+        description="Reconstruct the curve network and the surface of a scan. All lengths in metres.",
+    )
+    parser.add_argument("input", metavar="INPUT", help="a rawnet or a recording; - reads standard input")
+    _add_mesh_output(parser)
+    parser.add_argument("--network", type=Path, metavar="NET.json", help="also write the curve network")
+    parser.add_argument("--report", type=Path, metavar="REPORT.json", help="also write times, sizes, quality, warnings")
+    parser.add_argument("--step", default="1.6%", help="distance of points: %% of the diagonal, or m (default 1.6%%)")
+    parser.add_argument("--stretch", type=float, metavar="L2", help="smoothing length of the stretch term, m (auto)")
+    parser.add_argument("--bend", type=float, metavar="L4", help="smoothing length of the bend term, m (auto)")
+    parser.add_argument("--weights", choices=("auto", "thesis"), default="auto", help="smoothing (default auto)")
+    parser.add_argument(
+        "--curve-bias", choices=("auto", "on", "off"), default="auto", help="fit heading and scale per curve (auto)"
+    )
+    parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
+    parser.add_argument("--no-surface", action="store_true", help="stop after the network; MESH is then not written")
+    parser.set_defaults(command=_reconstruct)
+
+
+def _add_surface(commands: Commands) -> None:
+    parser = commands.add_parser(
+        "surface", help="curve network -> surface", description="Span a smooth surface over a curve network."
+    )
+    parser.add_argument("input", metavar="NET.json", help="a network JSON; - reads standard input")
+    _add_mesh_output(parser)
+    parser.add_argument("--report", type=Path, metavar="REPORT.json", help="also write times, sizes, quality, warnings")
+    parser.set_defaults(command=_surface)
+
+
+def _add_mesh_output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=_mesh_path,
+        required=True,
+        metavar="MESH",
+        help="mesh to write; the extension chooses: .glb (y up, as glTF demands), .obj .ply .stl (z up)",
+    )
+
+
+def _add_evaluate(commands: Commands) -> None:
+    parser = commands.add_parser(
+        "evaluate",
+        help="distance of a mesh or network to the truth",
+        description="Measure how far a mesh, or the points of a network, are from a true mesh.",
+    )
+    parser.add_argument("input", metavar="MESH", help="a mesh, or a network JSON (its points)")
+    parser.add_argument("--truth", required=True, metavar="TRUTH", help="the true mesh")
+    parser.add_argument(
+        "--align",
+        choices=("none", "rigid", "similarity"),
+        default="none",
+        help="register first: rotation and translation (rigid), also scale (similarity)",
+    )
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.set_defaults(command=_evaluate)
+
+
+def _add_simulate(commands: Commands) -> None:
+    from tracemesh.geometry.shapes import SHAPES
+
+    parser = commands.add_parser(
+        "simulate",
+        help="scan a built-in shape",
+        description="Write the scan that a Morphorider would make of a built-in shape, with its truth.",
+    )
+    parser.add_argument("shape", metavar="SHAPE", choices=sorted(SHAPES), help=", ".join(sorted(SHAPES)))
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="SCAN.rawnet")
+    parser.add_argument("--truth", type=Path, metavar="TRUTH.obj", help="also write the true mesh")
+    parser.add_argument("--recording", type=Path, metavar="SCAN.ndjson", help="also write what the device sends")
+    parser.add_argument(
+        "--noise", type=float, default=0.015, help="of a unit vector, per axis (default 0.015; 0: exact)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
+    parser.set_defaults(command=_simulate)
+
+
+def _add_serve(commands: Commands) -> None:
+    parser = commands.add_parser(
+        "serve",
+        help="run the server",
+        description="Serve sessions, live view, reconstruction jobs and the web page. Settings: docs/settings.md.",
+    )
+    parser.add_argument("--host", help="address to listen on (default 127.0.0.1; any other demands a token)")
+    parser.add_argument("--port", type=int, help="port to listen on (default 8000)")
+    parser.add_argument("--data-dir", type=Path, metavar="DIR", help="where sessions and meshes are kept")
+    parser.set_defaults(command=_serve)
+
+
+def _add_demo(commands: Commands) -> None:
+    parser = commands.add_parser(
+        "demo",
+        help="watch a virtual Morphorider scan a shape",
+        description="Start a server and a virtual Morphorider; open the printed address to watch curves grow, become a "
+        "network, become a surface.",
+    )
+    parser.add_argument("--headless", action="store_true", help="no browser: do the same work, write files, exit")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="with --headless: network.json, mesh.glb, report.json")
+    parser.add_argument("--port", type=int, default=8000, help="port of the server (default 8000; 0: a free one)")
+    parser.set_defaults(command=_demo)
+
+
+def _mesh_path(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower().lstrip(".") not in MESH_FORMATS:
+        wanted = ", ".join(f".{e}" for e in MESH_FORMATS)
+        raise argparse.ArgumentTypeError(f"wanted a file name that ends in {wanted}, got {text!r}")
+    return path
+
+
+def _reconstruct(chosen: argparse.Namespace) -> int:
+    from tracemesh.formats.scans import read_scan
+    from tracemesh.pipeline import reconstruct
+
+    parameters = ReconstructionParameters(
+        step=chosen.step,
+        stretch=chosen.stretch,
+        bend=chosen.bend,
+        weights=chosen.weights,
+        curve_bias=chosen.curve_bias,
+        soft=chosen.soft,
+        surface=not chosen.no_surface,
+    )
+    scan = read_scan(read_text(chosen.input), chosen.input)
+    with ProgressLine() as progress:
+        result = reconstruct(scan, parameters, progress)
+    _write_results(chosen, result)
+    return 0
+
+
+def _surface(chosen: argparse.Namespace) -> int:
+    from tracemesh.formats.networks import read_network
+    from tracemesh.pipeline import span
+
+    network = read_network(read_text(chosen.input), chosen.input)
+    with ProgressLine() as progress:
+        result = span(network, progress)
+    _write_results(chosen, result)
+    return 0
+
+
+def _write_results(chosen: argparse.Namespace, result: Reconstruction) -> None:
+    outputs: dict[Path, bytes] = {}
+    if result.mesh is not None:
+        outputs[chosen.output] = result.mesh_file(chosen.output.suffix.lower().lstrip("."))
+    if "network" in chosen and chosen.network:
+        outputs[chosen.network] = result.network_file()
+    if chosen.report:
+        outputs[chosen.report] = result.report_file()
+    write_all(outputs)
+
+
+def _evaluate(chosen: argparse.Namespace) -> int:
+    from tracemesh.formats.meshes import read_mesh
+    from tracemesh.formats.networks import read_network
+    from tracemesh.geometry.evaluation import evaluate
+
+    truth = read_mesh(read_bytes(chosen.truth), Path(chosen.truth).suffix.lstrip("."), chosen.truth)
+    if Path(chosen.input).suffix == ".json":
+        network = read_network(read_text(chosen.input), chosen.input)
+        measured = evaluate(network.points, network.normals, *truth, align=chosen.align)
+    else:
+        vertices, _ = read_mesh(read_bytes(chosen.input), Path(chosen.input).suffix.lstrip("."), chosen.input)
+        measured = evaluate(vertices, None, *truth, align=chosen.align)
+    print(json.dumps(measured.summary()) if chosen.json else measured.text())
+    return 0
+
+
+def _simulate(chosen: argparse.Namespace) -> int:
+    raise AssertionError
+
+
+def _serve(chosen: argparse.Namespace) -> int:
+    from tracemesh.api.server import serve
+    from tracemesh.settings import Settings
+
+    given = {"host": chosen.host, "port": chosen.port, "data_dir": chosen.data_dir}
+    serve(Settings(**{name: value for name, value in given.items() if value is not None}))
+    return 0
+
+
+def _demo(chosen: argparse.Namespace) -> int:
+    from tracemesh.demo import headless, watch
+
+    if chosen.headless:
+        return headless(chosen.out, chosen.port)
+    return watch(chosen.port)
