@@ -132,6 +132,7 @@ class NodeMark(Message):
     curve: Count
     sample: Count = Field(description="number of the sample within its curve")
     node: Count
+    undo: bool = Field(default=False, description="takes back the mark of this node at this sample: it was a mistake")
 
 
 class CurveEnd(Message):
@@ -141,6 +142,7 @@ class CurveEnd(Message):
     seq: Count
     curve: Count
     closed: bool = Field(default=False, description="the curve ends where it began")
+    discard: bool = Field(default=False, description="the curve was a mistake: kept as sent, left out of the scan")
 
 
 class Ack(Message):
