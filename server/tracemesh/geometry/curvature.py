@@ -1,0 +1,30 @@
+"""Mean curvature from positions and propagated normals (thesis section 4.5.2, Eq. 4.18), with its sign.
+
+The printed -|H| N bends every patch outwards; the component along the normal keeps saddles and hollows.
+"""
+
+import numpy as np
+
+from tracemesh.geometry.laplacian import lumped_mass, triangle_areas
+from tracemesh.geometry.network import Floats, Ints
+
+
+def mean_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
+    """(n,) 1/m, mean of the principal curvatures, 1/r on a sphere of radius r with outward normals.
+
+    vertices, normals: (n, 3). faces: (f, 3). The curvature vector -2 H N is the sum of (edge opposite of the vertex) x
+    (mean normal of the face) over the faces around a vertex, over twice its mass. Not defined on an open boundary,
+    where the sum lacks faces.
+    """
+    corners = vertices[faces]
+    facing = normalised(normals[faces].sum(1))
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    flux = 0.5 * (np.cross(opposite, facing[:, None]) * normals[faces]).sum(2)
+    total = np.bincount(faces.ravel(), flux.ravel(), len(vertices))
+    return np.asarray(-0.5 * total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
+
+
+def normalised(vectors: Floats) -> Floats:
+    """(..., 3) unit vectors; a zero vector stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1.0))

@@ -1,0 +1,58 @@
+"""Cotangent Laplacians of triangle meshes (thesis section 2.8, Eq. 2.40).
+
+L = M^-1 C with C the cotangent matrix, negative semidefinite, and M the lumped mass (a third of the areas around a
+vertex).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import robust_laplacian
+from scipy import sparse
+
+from tracemesh.geometry.network import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Laplacian:
+    """stiffness: (n, n) cotangent matrix C, no unit. mass: (n,) lumped area, m^2."""
+
+    stiffness: sparse.csr_matrix
+    mass: Floats
+
+
+def cotangent_laplacian(corners: Floats, faces: Ints, count: int) -> Laplacian:
+    """Laplacian of faces in any embedding, even one that differs from patch to patch.
+
+    corners: (f, 3, d) positions of every face's corners, m. faces: (f, 3) vertex indices below count.
+    """
+    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # edge k lies opposite of corner k
+    dots = -(np.roll(edges, -1, axis=1) * np.roll(edges, -2, axis=1)).sum(2)
+    area = triangle_areas(corners)
+    weights = (dots / (4 * area[:, None])).ravel()
+    i, j = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel()
+    rows, columns = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
+    values = np.concatenate([weights, weights, -weights, -weights])
+    return Laplacian(sparse.csr_matrix((values, (rows, columns)), (count, count)), lumped_mass(area, faces, count))
+
+
+def intrinsic_delaunay_laplacian(vertices: Floats, faces: Ints) -> Laplacian:
+    """Laplacian on the intrinsic Delaunay triangulation of a mesh (Sharp and Crane 2020): no negative weights, however
+    bad the faces.
+
+    vertices: (n, 3) m. faces: (f, 3).
+    """
+    stiffness, mass = robust_laplacian.mesh_laplacian(vertices, faces)
+    return Laplacian(sparse.csr_matrix(-stiffness), np.asarray(mass.diagonal()))
+
+
+def triangle_areas(corners: Floats) -> Floats:
+    """(f,) m^2. corners: (f, 3, 2 or 3)."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    gram = (a * a).sum(1) * (b * b).sum(1) - (a * b).sum(1) ** 2
+    return np.asarray(0.5 * np.sqrt(np.maximum(gram, np.finfo(float).tiny)))
+
+
+def lumped_mass(area: Floats, faces: Ints, count: int) -> Floats:
+    """(n,) a third of the areas of the faces around every vertex."""
+    return np.bincount(faces.ravel(), np.repeat(area / 3, 3), count)
