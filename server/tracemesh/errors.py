@@ -8,7 +8,8 @@ TracemeshError
 ├── Cancelled             somebody asked for the work to stop
 └── ResourceError         what a request to the service names or asks for cannot be had
     ├── NotFound
-    └── Conflict
+    ├── Conflict
+    └── Refused           a device's message that is not taken: carries the code that the protocol has for it
 """
 
 
@@ -46,3 +47,13 @@ class NotFound(ResourceError):  # noqa: N818 - HTTP's own words
 
 class Conflict(ResourceError):  # noqa: N818 - HTTP's own words
     """The state of the resource does not allow it."""
+
+
+class Refused(ResourceError):  # noqa: N818 - the protocol's own word
+    """A device's message that the server does not take."""
+
+    def __init__(self, code: str, message: str, expected_seq: int | None = None) -> None:
+        """`code` as in wire.device.ErrorMessage; `expected_seq` with code "gap"."""
+        super().__init__(message)
+        self.code = code
+        self.expected_seq = expected_seq

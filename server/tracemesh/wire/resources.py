@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from tracemesh.wire.base import Count, Identifier, Message, Vector
+from tracemesh.wire.device import Device
 
 
 class SessionCreate(Message):
@@ -51,6 +52,26 @@ class Curve(Message):
     samples: Count
     length: float = Field(ge=0, description="m, as the odometer saw it")
     marks: list[Mark]
+
+
+class CurveUpdate(Message):
+    """PATCH /sessions/{session}/curves/{index}; absent fields stay."""
+
+    boundary: bool | None = None
+    closed: bool | None = None
+    removed: bool | None = Field(default=None, description="left out of everything; its samples stay stored")
+    marks: list[Mark] | None = Field(default=None, max_length=10_000, description="replace all marks of the curve")
+
+
+class RecordingSummary(Message):
+    """A recording of a session: what one device sent, or one uploaded file."""
+
+    id: Identifier
+    session: Identifier
+    device: Device
+    messages: Count
+    bytes: Count
+    created: datetime
 
 
 class ReconstructionParameters(Message):
