@@ -1,0 +1,92 @@
+"""Positions of all curves at once from their edges (thesis 3.6, Eq. 3.31).
+
+Least squares on the edges, not on their divergence as in the thesis's rows: its normal equations are the graph Laplacian
+of the network. A segment's interior follows its nodes linearly in arc length, which leaves a small Laplacian over the
+nodes and O(n) else. Both are exact for frames without noise; on noisy ones the edges estimate better.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from tracemesh.errors import ScanError
+from tracemesh.geometry.cleaning import curve_name
+from tracemesh.geometry.rotations import left_jacobian, log
+from tracemesh.geometry.samples import Layout
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Positions:
+    """points: (n, 3) m, of a layout's rows, centred on the mean of the nodes; equal at rows of the same node.
+
+    gaps: (s, 3) m, what each segment's edges lacked to lead from node to node.
+    """
+
+    points: Floats
+    gaps: Floats
+
+
+def arc_edges(layout: Layout, frames: Floats) -> Floats:
+    """Edge vectors (e, 3), m, between frames (n, 3, 3): h X J_l(omega) e1, exact on lines, circles and helices."""
+    start = frames[layout.edges]
+    turn = log(np.swapaxes(start, 1, 2) @ frames[layout.edges + 1])
+    direction = np.einsum("nij,nj->ni", start, left_jacobian(turn)[:, :, 0])
+    result: Floats = layout.lengths[:, None] * direction
+    return result
+
+
+def check_connected(layout: Layout, curve_indices: Ints) -> None:
+    """Raise ScanError, naming the pieces, unless all curves hang together at nodes."""
+    ends = layout.segment_nodes
+    ones = np.ones(len(ends))
+    graph = coo_array((ones, (ends[:, 0], ends[:, 1])), shape=(layout.node_count, layout.node_count))
+    count, label = connected_components(graph, directed=False)
+    if count == 1:
+        return
+    piece = label[layout.nodes[np.searchsorted(layout.marks, layout.first[:-1])]]
+    names = [", ".join(curve_name(c) for c in curve_indices[piece == p]) for p in np.unique(piece)]
+    raise ScanError(f"the network is in {count} pieces that share no node: " + "; ".join(f"({name})" for name in names))
+
+
+def node_positions(layout: Layout, vectors: Floats, weights: Floats) -> Floats:
+    """Positions (k, 3), m, with mean zero, of nodes joined by weighted (s,) segment vectors (s, 3)."""
+    a, b = layout.segment_nodes.T
+    count = layout.node_count
+    if count == 1:
+        return np.zeros((1, 3))
+    row, column = np.concatenate([a, b, a, b]), np.concatenate([a, b, b, a])
+    laplacian = coo_array((np.concatenate([weights, weights, -weights, -weights]), (row, column)), shape=(count, count))
+    right = np.zeros((count, 3))
+    np.add.at(right, b, weights[:, None] * vectors)
+    np.add.at(right, a, -weights[:, None] * vectors)
+    points = np.zeros((count, 3))
+    points[1:] = splu(laplacian.tocsc()[1:, 1:]).solve(right[1:])
+    return points - points.mean(axis=0)
+
+
+def solve_positions(layout: Layout, edges: Floats) -> Positions:
+    """Positions of a connected layout's rows from its edge vectors (e, 3), m.
+
+    Minimises the sum over edges of |x_{k+1} - x_k - e_k|^2 / h_k: every metre travelled errs alike.
+    """
+    vectors = np.add.reduceat(edges, np.searchsorted(layout.edges, layout.segment_rows[:, 0]), axis=0)
+    nodes = node_positions(layout, vectors, 1 / layout.segment_lengths)
+    a, b = layout.segment_nodes.T
+    gaps = nodes[b] - nodes[a] - vectors
+    rates = gaps / layout.segment_lengths[:, None]
+    edges = edges + rates[layout.edge_segment] * layout.lengths[:, None]
+    points = np.zeros((layout.size, 3))
+    points[layout.edges + 1] = edges
+    points = np.cumsum(points, axis=0)
+    first_mark = np.searchsorted(layout.marks, layout.first[:-1])
+    shift = nodes[layout.nodes[first_mark]] - points[layout.first[:-1]]
+    points += shift[layout.curve]
+    points[layout.marks] = nodes[layout.nodes]
+    return Positions(points, gaps)

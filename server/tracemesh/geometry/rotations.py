@@ -1,0 +1,122 @@
+"""Rotations as matrices, vectors and quaternions (w, x, y, z), vectorised over leading axes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_SMALL = 1e-4  # rad; below it the Taylor series of the coefficients is exact to rounding
+
+
+def hat(vector: Floats) -> Floats:
+    """Cross-product matrices (..., 3, 3) of vectors (..., 3)."""
+    matrix = np.zeros((*vector.shape, 3))
+    x, y, z = np.moveaxis(vector, -1, 0)
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
+    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
+    return matrix
+
+
+def skew_vector(matrix: Floats) -> Floats:
+    """Vectors (..., 3) with hat(v) = M - M^T for matrices (..., 3, 3)."""
+    columns = (
+        matrix[..., 2, 1] - matrix[..., 1, 2],
+        matrix[..., 0, 2] - matrix[..., 2, 0],
+        matrix[..., 1, 0] - matrix[..., 0, 1],
+    )
+    return np.stack(columns, axis=-1)
+
+
+def _rodrigues(angle: Floats) -> tuple[Floats, Floats, Floats]:
+    """sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 for angles (...)."""
+    small = angle < _SMALL
+    a = np.where(small, 1.0, angle)
+    square = angle * angle
+    first = np.where(small, 1 - square / 6, np.sin(a) / a)
+    second = np.where(small, 0.5 - square / 24, 2 * (np.sin(a / 2) / a) ** 2)
+    third = np.where(small, 1 / 6 - square / 120, (a - np.sin(a)) / a**3)
+    return first, second, third
+
+
+def exp(vector: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
+    first, second, _ = _rodrigues(np.linalg.norm(vector, axis=-1))
+    cross = hat(vector)
+    result: Floats = np.eye(3) + first[..., None, None] * cross + second[..., None, None] * (cross @ cross)
+    return result
+
+
+def log(matrix: Floats) -> Floats:
+    """Rotation vectors (..., 3), rad, |v| <= pi, of rotation matrices (..., 3, 3)."""
+    q = matrix_to_quaternion(matrix)
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1)
+    half = np.arctan2(sine, q[..., 0])
+    factor = np.where(sine < _SMALL, 2 / np.maximum(q[..., 0], 0.5), 2 * half / np.maximum(sine, _SMALL))
+    result: Floats = factor[..., None] * q[..., 1:]
+    return result
+
+
+def left_jacobian(vector: Floats) -> Floats:
+    """J_l(v) (..., 3, 3), the mean of exp(s v) over s in [0, 1]."""
+    _, second, third = _rodrigues(np.linalg.norm(vector, axis=-1))
+    cross = hat(vector)
+    result: Floats = np.eye(3) + second[..., None, None] * cross + third[..., None, None] * (cross @ cross)
+    return result
+
+
+def quaternion_to_matrix(quaternion: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), w first."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    matrix = np.empty((*quaternion.shape[:-1], 3, 3))
+    matrix[..., 0, 0] = 1 - 2 * (y * y + z * z)
+    matrix[..., 1, 1] = 1 - 2 * (x * x + z * z)
+    matrix[..., 2, 2] = 1 - 2 * (x * x + y * y)
+    matrix[..., 0, 1], matrix[..., 1, 0] = 2 * (x * y - w * z), 2 * (x * y + w * z)
+    matrix[..., 0, 2], matrix[..., 2, 0] = 2 * (x * z + w * y), 2 * (x * z - w * y)
+    matrix[..., 1, 2], matrix[..., 2, 1] = 2 * (y * z - w * x), 2 * (y * z + w * x)
+    return matrix
+
+
+def matrix_to_quaternion(matrix: Floats) -> Floats:
+    """Unit quaternions (..., 4), w first, of rotation matrices (..., 3, 3); the sign is arbitrary.
+
+    The largest of the four components is computed first, so that none is divided by a small number.
+    """
+    diagonal = np.stack([matrix[..., i, i] for i in range(3)], axis=-1)
+    trace = diagonal.sum(axis=-1)
+    squares = np.concatenate([(1 + trace)[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)  # 4 q_i^2
+    outer = np.empty((*matrix.shape[:-2], 4, 4))  # 4 q_i q_j
+    outer[..., 0, 1:] = outer[..., 1:, 0] = skew_vector(matrix)
+    outer[..., 1:, 1:] = matrix + np.swapaxes(matrix, -1, -2)
+    for i in range(4):
+        outer[..., i, i] = squares[..., i]
+    row = np.take_along_axis(outer, squares.argmax(axis=-1)[..., None, None], axis=-2)[..., 0, :]
+    result: Floats = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    return result
+
+
+def align_signs(quaternion: Floats) -> Floats:
+    """The same rotations (n, 4) with signs chosen so that consecutive quaternions have a dot product >= 0."""
+    if len(quaternion) < 2:
+        return quaternion
+    flips = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
+    sign = np.concatenate([[1.0], np.where(np.cumsum(flips) % 2, -1.0, 1.0)])
+    result: Floats = quaternion * sign[:, None]
+    return result
+
+
+def normalized(vector: Floats) -> Floats:
+    """Unit vectors (..., n) along vectors (..., n) that are not zero."""
+    result: Floats = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+    return result
+
+
+def darboux_frames(tangent: Floats, normal: Floats) -> Floats:
+    """Frames [t N B] (n, 3, 3) with the given unit normals N (n, 3) and t the tangent (n, 3) made orthogonal to them.
+
+    The normal is kept because a device's tangent may be the chord to its next sample, which leaves the tangent plane.
+    """
+    n = normalized(normal)
+    t = normalized(tangent - np.sum(tangent * n, axis=-1, keepdims=True) * n)
+    return np.stack([t, n, np.cross(t, n)], axis=-1)
