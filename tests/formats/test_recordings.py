@@ -1,0 +1,184 @@
+"""Recordings: reading undoes writing, every kind of device gives the same scan, faults are named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tracemesh.errors import InputError, ScanError
+from tracemesh.formats.rawnet import read_rawnet
+from tracemesh.formats.recordings import (
+    Recording,
+    read_recording,
+    recording_from_scan,
+    recording_from_simulation,
+    scan_from_recordings,
+    write_recording,
+)
+from tracemesh.geometry.shapes import SHAPES, leaf
+from tracemesh.geometry.simulation import Imperfections, plan_scan, simulate_scan
+from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Recorded, Samples, Wheel
+
+WHEEL = Wheel(circumference=0.1, ticks_per_turn=500)
+
+
+def hello(**device: object) -> Hello:
+    return Hello(recording="r", device=Device.model_validate({"id": "d", "kind": "phone"} | device))
+
+
+def recording(*messages: Recorded, **device: object) -> Recording:
+    numbered = [m.model_copy(update={"seq": seq}) for seq, m in enumerate(messages)]
+    return Recording(hello(**device), numbered)
+
+
+def curve(*inner: Recorded, boundary: bool = False, closed: bool = False) -> list[Recorded]:
+    return [CurveStart(seq=0, curve=0, boundary=boundary), *inner, CurveEnd(seq=0, curve=0, closed=closed)]
+
+
+def quaternions(count: int, first: int = 0, **columns: object) -> Samples:
+    """A turn about the vertical, one hundredth of a revolution per sample."""
+    half = np.pi * (first + np.arange(count)) / 100
+    rows = np.column_stack([np.cos(half), 0 * half, 0 * half, np.sin(half)]).tolist()
+    data = {
+        "seq": 0,
+        "curve": 0,
+        "first_sample": first,
+        "quaternion": rows,
+        "distance": [*map(float, range(first, first + count))],
+    }
+    return Samples.model_validate({k: v for k, v in (data | columns).items() if v is not None})
+
+
+def mark(sample: int, node: int, undo: bool = False) -> NodeMark:
+    return NodeMark(seq=0, curve=0, sample=sample, node=node, undo=undo)
+
+
+def test_reading_undoes_writing() -> None:
+    simulated = recording_from_simulation(simulate_scan(plan_scan(leaf())), "leaf")
+    assert read_recording(write_recording(simulated).splitlines()) == simulated
+
+
+def test_a_rawnet_survives_the_way_through_a_recording(shared_data: Path) -> None:
+    scan = read_rawnet((shared_data / "lilium.rawnet").read_text())
+    text = write_recording(recording_from_scan(scan, "lilium"))
+    again = scan_from_recordings([read_recording(text.splitlines())])
+    for one, two in zip(scan.curves, again.curves, strict=True):
+        for name in ("distance", "tangent", "normal", "node_samples", "node_ids"):
+            assert getattr(one, name).tobytes() == getattr(two, name).tobytes()
+        assert (one.boundary, one.closed) == (two.boundary, two.closed)
+
+
+@pytest.mark.parametrize("name", sorted(SHAPES))
+def test_ticks_and_vectors_of_a_perfect_device_give_the_exact_frames(name: str) -> None:
+    plan = plan_scan(SHAPES[name](), imperfections=Imperfections().scaled(0.0))
+    scan = scan_from_recordings([recording_from_simulation(simulate_scan(plan), name)])
+    for measured, true in zip(scan.curves, plan.curves, strict=True):
+        np.testing.assert_allclose(measured.distance[measured.node_samples], true.node_positions, atol=3e-4)
+        frames = true.at(measured.distance)[1]
+        np.testing.assert_allclose(measured.tangent, frames[:, :, 0], atol=0.01)
+        np.testing.assert_allclose(measured.normal, frames[:, :, 1], atol=0.01)
+
+
+def test_a_mounting_turns_the_devices_axes_into_the_frame() -> None:
+    mounting = Rotation.from_euler("xyz", [0.3, -0.5, 1.1])
+    frames = Rotation.random(20, rng=1)
+    device = (frames * mounting.inv()).as_quat(scalar_first=True).tolist()
+    block = Samples(seq=0, curve=0, first_sample=0, quaternion=device, distance=[0.1 * i for i in range(20)])
+    scan = scan_from_recordings([recording(*curve(block), mounting=tuple(mounting.as_quat(scalar_first=True)))])
+    np.testing.assert_allclose(scan.curves[0].tangent, frames.as_matrix()[:, :, 0], atol=1e-12)
+    np.testing.assert_allclose(scan.curves[0].normal, frames.as_matrix()[:, :, 1], atol=1e-12)
+
+
+def test_a_quaternion_and_its_negative_are_the_same_orientation() -> None:
+    plain = quaternions(10)
+    assert plain.quaternion is not None
+    flipped = plain.model_copy(
+        update={"quaternion": [tuple((-1) ** i * v for v in q) for i, q in enumerate(plain.quaternion)]}
+    )
+    one, two = (scan_from_recordings([recording(*curve(block))]).curves[0] for block in (plain, flipped))
+    np.testing.assert_allclose(one.tangent, two.tangent, atol=1e-15)
+
+
+def test_blocks_are_joined_and_recordings_follow_each_other() -> None:
+    two = [recording(*curve(quaternions(10), quaternions(5, 10), mark(2, 7), mark(12, 8), boundary=True)) for _ in "ab"]
+    scan = scan_from_recordings(two)
+    assert len(scan.curves) == 2
+    assert scan.curves[1].distance.tolist() == [*map(float, range(15))]
+    assert scan.curves[0].node_samples.tolist() == [2, 12]
+    assert scan.curves[0].boundary
+
+
+def test_undone_marks_and_discarded_curves_are_left_out() -> None:
+    kept = recording(*curve(quaternions(10), mark(2, 7), mark(3, 7), mark(3, 7, undo=True)))
+    assert scan_from_recordings([kept]).curves[0].node_samples.tolist() == [2]
+    dropped = [*kept.messages[:-1], CurveEnd(seq=9, curve=0, discard=True)]
+    assert scan_from_recordings([Recording(hello(), dropped)]).curves == ()
+
+
+def test_a_curve_that_is_still_being_scanned_is_part_of_the_scan() -> None:
+    assert len(scan_from_recordings([Recording(hello(), recording(*curve(quaternions(10))).messages[:-1])]).curves) == 1
+
+
+def test_a_closed_curve_goes_from_its_first_node_around_to_it() -> None:
+    scanned = scan_from_recordings([recording(*curve(quaternions(101), mark(20, 4), mark(70, 5), closed=True))]).curves[
+        0
+    ]
+    assert scanned.node_ids.tolist() == [4, 5, 4]
+    assert scanned.node_samples.tolist() == [0, 50, 100]
+    assert scanned.distance.tolist() == [*map(float, range(20, 121))]
+    np.testing.assert_allclose(scanned.tangent[0], scanned.tangent[-1], atol=1e-12)
+    angle = np.unwrap(np.arctan2(scanned.tangent[:, 1], scanned.tangent[:, 0]))
+    np.testing.assert_allclose(np.diff(angle), 2 * np.pi / 100, atol=1e-12)
+
+
+def test_without_wheel_a_steady_hand_is_assumed() -> None:
+    block = quaternions(101, distance=None, time=[0.05 * i for i in range(101)])
+    scanned = scan_from_recordings([recording(*curve(block, mark(0, 0), mark(100, 1)))]).curves[0]
+    assert np.ptp(np.diff(scanned.distance)[2:-2]) < 1e-12
+    assert scanned.distance[-1] > 0
+
+
+UP = (0, 0, 1)
+NO_WHEEL = quaternions(3, distance=None, ticks=[(0, i) for i in range(3)])
+FAULTS: list[tuple[list[Recorded], type[Exception], str]] = [
+    (curve(quaternions(5), quaternions(5, 6)), InputError, "curve 1: wanted sample 5 next, got 6"),
+    (curve(quaternions(5), mark(5, 0)), InputError, "curve 1: node 0 is marked at sample 5, wanted less than 5"),
+    (curve(quaternions(5), mark(3, 0), mark(3, 1)), InputError, "curve 1: sample 3 is marked as node 0 and as node 1"),
+    (curve(quaternions(5), mark(3, 0, undo=True)), InputError, "nothing to undo"),
+    (curve(quaternions(5))[1:], InputError, "got samples before curve.start"),
+    ([*curve(quaternions(5)), quaternions(5, 5)], InputError, "got samples after curve.end"),
+    (curve(quaternions(5)) * 2, InputError, "curve 1 begins twice"),
+    (curve(quaternions(5, distance=None)), InputError, "curve 1: wanted ticks, distance or time"),
+    (curve(NO_WHEEL), InputError, "names no wheel"),
+    (curve(quaternions(2, quaternion=[(0, 0, 0, 0)] * 2)), ScanError, "curve 1: quaternion 1 is zero"),
+    (curve(quaternions(1, quaternion=None, acceleration=[UP], magnetic=[UP])), ScanError, "parallel"),
+    (curve(quaternions(3, distance=None, time=[0.0, 1.0, 0.5])), ScanError, "curve 1: .* clock runs backwards"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("messages", "error", "words"), FAULTS, ids=[f[2] for f in FAULTS])
+def test_contradictions_name_the_curve(messages: list[Recorded], error: type[Exception], words: str) -> None:
+    with pytest.raises(error, match=words):
+        scan_from_recordings([recording(*messages)])
+
+
+LINES = write_recording(recording(*curve(quaternions(3)), wheel=WHEEL)).splitlines()
+FILE_FAULTS = {
+    "nothing": ([], "got nothing"),
+    "no hello": (LINES[1:], "line 1: wanted hello first, got curve.start"),
+    "two hellos": ([LINES[0], LINES[0]], "line 2: wanted one hello"),
+    "gap": ([LINES[0], LINES[1], "", LINES[3]], "line 4: wanted the message with seq 1, got 2"),
+    "cut": ([*LINES[:2], LINES[2][:40]], "line 3: Invalid JSON"),
+    "not a number": ([*LINES[:2], LINES[2].replace("1.0", '"one"', 1)], "line 3: samples"),
+    "not finite": ([*LINES[:2], LINES[2].replace("1.0", "NaN", 1)], "line 3: "),
+    "unknown type": ([LINES[0], '{"type": "sample"}'], "line 2: .*'sample'"),
+}
+
+
+@pytest.mark.parametrize("name", FILE_FAULTS)
+def test_damaged_files_name_the_line(name: str) -> None:
+    lines, words = FILE_FAULTS[name]
+    with pytest.raises(InputError, match=words) as caught:
+        read_recording(lines, "scan.ndjson")
+    assert "scan.ndjson" in str(caught.value)
