@@ -1,0 +1,81 @@
+import type { Curve, Problem, Reconstruction, ReconstructionParameters, Session } from "../wire.gen";
+
+/** An answer of the server that is not a success, in its own words. */
+export class ApiProblem extends Error {
+  constructor(
+    readonly status: number,
+    readonly title: string,
+    readonly detail: string,
+  ) {
+    super(detail || title);
+    this.name = "ApiProblem";
+  }
+}
+
+type Body = string | Blob;
+
+/** The REST API of the server that sent this page. */
+export class Api {
+  constructor(
+    private readonly base = "/api/v1",
+    private readonly fetcher: typeof fetch = (input, init) => fetch(input, init),
+  ) {}
+
+  sessions(): Promise<Session[]> {
+    return this.#json<Session[]>("GET", "/sessions");
+  }
+
+  session(id: string): Promise<Session> {
+    return this.#json<Session>("GET", `/sessions/${id}`);
+  }
+
+  createSession(name: string): Promise<Session> {
+    return this.#json<Session>("POST", "/sessions", JSON.stringify({ name }));
+  }
+
+  renameSession(id: string, name: string): Promise<Session> {
+    return this.#json<Session>("PATCH", `/sessions/${id}`, JSON.stringify({ name }));
+  }
+
+  async deleteSession(id: string): Promise<void> {
+    await this.#request("DELETE", `/sessions/${id}`);
+  }
+
+  curves(session: string): Promise<Curve[]> {
+    return this.#json<Curve[]>("GET", `/sessions/${session}/curves`);
+  }
+
+  reconstruct(session: string, parameters: Partial<ReconstructionParameters>): Promise<Reconstruction> {
+    return this.#json<Reconstruction>("POST", `/sessions/${session}/reconstructions`, JSON.stringify(parameters));
+  }
+
+  reconstruction(id: string): Promise<Reconstruction> {
+    return this.#json<Reconstruction>("GET", `/reconstructions/${id}`);
+  }
+
+  cancel(reconstruction: string): Promise<Reconstruction> {
+    return this.#json<Reconstruction>("POST", `/reconstructions/${reconstruction}/cancel`);
+  }
+
+  /** A JSON artifact by its URL. */
+  async artifact<T>(url: string): Promise<T> {
+    return (await (await this.#check(await this.fetcher(url))).json()) as T;
+  }
+
+  async #json<T>(method: string, path: string, body?: Body): Promise<T> {
+    return (await (await this.#request(method, path, body)).json()) as T;
+  }
+
+  async #request(method: string, path: string, body?: Body, type = "application/json"): Promise<Response> {
+    const init: RequestInit = { method };
+    if (body !== undefined) Object.assign(init, { body, headers: { "content-type": type } });
+    return this.#check(await this.fetcher(this.base + path, init));
+  }
+
+  async #check(response: Response): Promise<Response> {
+    if (response.ok) return response;
+    const problem = (await response.json().catch(() => ({}))) as Partial<Problem>;
+    const title = problem.title ?? `${response.status} ${response.statusText}`;
+    throw new ApiProblem(response.status, title, problem.detail ?? "");
+  }
+}

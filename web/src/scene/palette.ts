@@ -1,0 +1,27 @@
+import { Color } from "three";
+
+/** The colours of the scene: the same tokens that the panels use. */
+export interface Palette {
+  readonly background: Color;
+  readonly grid: Color;
+  readonly boundary: Color;
+  readonly interior: Color;
+  readonly accent: Color;
+  readonly surface: Color;
+  readonly inside: Color;
+}
+
+/** Read the tokens (CSS custom properties) as they are now. */
+export function readPalette(element: Element): Palette {
+  const style = getComputedStyle(element);
+  const token = (name: string): Color => new Color(style.getPropertyValue(`--${name}`).trim());
+  return {
+    background: token("view"),
+    grid: token("grid"),
+    boundary: token("curve-boundary"),
+    interior: token("curve-interior"),
+    accent: token("accent"),
+    surface: token("surface"),
+    inside: token("surface-inside"),
+  };
+}

@@ -1,0 +1,201 @@
+import { Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from "three";
+import { boundingBox, type Box, type Vector } from "../geometry/vectors";
+import { roundDown } from "../geometry/units";
+import type { Network } from "../state/network";
+import { CurvesLayer } from "./curves";
+import type { LoadedSurface } from "./glb";
+import { Ground } from "./ground";
+import type { LookName } from "./looks";
+import type { Palette } from "./palette";
+import { Rig, VIEWS } from "./rig";
+import { SurfaceLayer } from "./surface";
+
+const TRANSITION_SECONDS = 0.2;
+const GRID_LINES = 8;
+
+export interface Projected {
+  readonly x: number;
+  readonly y: number;
+}
+
+export interface ViewportEvents {
+  /** A frame was drawn: overlays follow now. */
+  drawn(): void;
+  /** A person took the camera. */
+  grabbed(): void;
+}
+
+/** The 3D view: draws when something changed, and only then. */
+export class Viewport {
+  readonly rig: Rig;
+  readonly #renderer: WebGLRenderer;
+  readonly #scene = new Scene();
+  readonly #curves: CurvesLayer;
+  readonly #ground: Ground;
+  readonly #resizer: ResizeObserver;
+  #surface: SurfaceLayer | undefined;
+  #box: Box | undefined;
+  #frame = 0;
+  #last = 0;
+  #fade = 1;
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private palette: Palette,
+    private readonly still: boolean,
+    private readonly events: ViewportEvents,
+  ) {
+    this.#renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.rig = new Rig(canvas, () => events.grabbed(), () => this.invalidate());
+    this.#curves = new CurvesLayer(palette);
+    this.#ground = new Ground(palette.grid);
+    this.#scene.add(this.#ground.object, this.#curves.object);
+    this.#scene.background = palette.background;
+    this.#resizer = new ResizeObserver(() => this.#resize());
+    this.#resizer.observe(canvas);
+    this.#resize();
+  }
+
+  /** Take over what the network shows now; `replaced`: its points may lie elsewhere than before. */
+  showNetwork(network: Network, replaced: boolean, follow: boolean): void {
+    if (replaced) this.#curves.replace(network, !this.still);
+    else this.#curves.grow(network);
+    this.#measure(network);
+    if (follow) this.fit();
+    this.invalidate();
+  }
+
+  showSurface(loaded: LoadedSurface | undefined, look: LookName): void {
+    if (this.#surface) {
+      this.#scene.remove(this.#surface.object);
+      this.#surface.dispose();
+      this.#surface = undefined;
+    }
+    if (loaded) {
+      this.#surface = new SurfaceLayer(loaded.geometry, loaded.curvatureRange, this.palette, look);
+      this.#scene.add(this.#surface.object);
+      this.#fade = this.still ? 1 : 0;
+      this.#surface.opacity = this.#fade;
+    }
+    this.invalidate();
+  }
+
+  setLook(look: LookName): void {
+    if (this.#surface) this.#surface.look = look;
+    this.invalidate();
+  }
+
+  setVisible(parts: { curves: boolean; surface: boolean; grid: boolean }): void {
+    this.#curves.object.visible = parts.curves;
+    this.#ground.object.visible = parts.grid;
+    if (this.#surface) this.#surface.object.visible = parts.surface;
+    this.invalidate();
+  }
+
+  highlight(curve: number | undefined): void {
+    this.#curves.highlight(curve);
+    this.invalidate();
+  }
+
+  recolor(palette: Palette): void {
+    this.palette = palette;
+    this.#scene.background = palette.background;
+    this.#curves.recolor(palette);
+    this.#ground.recolor(palette.grid);
+    this.#surface?.recolor(palette);
+    this.invalidate();
+  }
+
+  /** Bring everything into sight; from the n-th named view, or from where the eye is. */
+  fit(view?: number): void {
+    const named = view === undefined ? undefined : VIEWS[view];
+    if (this.#box) this.rig.frame(this.#box, named && new Vector3(...named.direction).normalize());
+    this.invalidate();
+  }
+
+  /** Turn about the point of the surface under the pointer, if there is one. */
+  focusAt(x: number, y: number): void {
+    const point = this.pick(x, y);
+    if (point) this.rig.focus(new Vector3(...point));
+    this.invalidate();
+  }
+
+  /** Point of the surface at a place of the view (CSS px from its top left corner), m. */
+  pick(x: number, y: number): Vector | undefined {
+    if (!this.#surface) return undefined;
+    const caster = new Raycaster();
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    caster.setFromCamera(new Vector2((2 * x) / width - 1, 1 - (2 * y) / height), this.rig.camera);
+    return caster.intersectObject(this.#surface.object)[0]?.point.toArray();
+  }
+
+  /** Where a point (m) is on the screen, CSS px; undefined behind the eye. */
+  project(point: ArrayLike<number>): Projected | undefined {
+    const v = new Vector3(point[0], point[1], point[2]).project(this.rig.camera);
+    if (v.z > 1) return undefined;
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    return { x: ((v.x + 1) / 2) * width, y: ((1 - v.y) / 2) * height };
+  }
+
+  tips(): Float32Array[] {
+    return this.#curves.tips();
+  }
+
+  get metresPerPixel(): number {
+    return this.rig.metresPerPixel(this.canvas.clientHeight);
+  }
+
+  /** Ask for one more frame. */
+  invalidate(): void {
+    if (this.#frame) return;
+    this.#frame = requestAnimationFrame((now) => this.#draw(now));
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.#frame);
+    this.#resizer.disconnect();
+    this.rig.dispose();
+    this.#curves.dispose();
+    this.#ground.dispose();
+    this.#surface?.dispose();
+    this.#renderer.dispose();
+  }
+
+  #draw(now: number): void {
+    const seconds = Math.min((now - this.#last) / 1000, 0.05);
+    this.#last = now;
+    this.#frame = 0;
+    const moving = this.#step(seconds);
+    this.#renderer.render(this.#scene, this.rig.camera);
+    this.events.drawn();
+    if (moving) this.invalidate();
+  }
+
+  #step(seconds: number): boolean {
+    const morphing = this.#curves.step(seconds / TRANSITION_SECONDS);
+    const travelling = this.rig.step(this.still ? Infinity : seconds);
+    const fading = this.#fade < 1;
+    if (fading && this.#surface) {
+      this.#fade = Math.min(this.#fade + seconds / TRANSITION_SECONDS, 1);
+      this.#surface.opacity = this.#fade;
+    }
+    return morphing || travelling || fading;
+  }
+
+  #measure(network: Network): void {
+    this.#box = boundingBox([...network.curves.values()].map((curve) => curve.points.coordinates));
+    if (!this.#box) return;
+    const { min, max } = this.#box;
+    const size = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
+    const centre = new Vector3((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, min[2]);
+    this.#ground.place(centre, roundDown(Math.max(size, 1e-3) / GRID_LINES), 1.1 * Math.max(size, 1e-3));
+  }
+
+  #resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.#renderer.setSize(width, height, false);
+    this.rig.resize(width, height);
+    this.invalidate();
+  }
+}

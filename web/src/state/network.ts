@@ -1,0 +1,103 @@
+import type { LiveCurve, NodePosition } from "../wire.gen";
+import type { ToBrowser } from "../protocol/messages";
+
+/** Points that grow at the end: [x0, y0, z0, x1, ...] in m, world (ENU, z up). */
+export class Points {
+  #data: Float32Array;
+  #length = 0;
+
+  constructor(positions: ArrayLike<number> = []) {
+    this.#data = Float32Array.from(positions);
+    this.#length = positions.length;
+  }
+
+  /** Number of points. */
+  get count(): number {
+    return this.#length / 3;
+  }
+
+  /** The coordinates; valid until the next change. */
+  get coordinates(): Float32Array {
+    return this.#data.subarray(0, this.#length);
+  }
+
+  /** Replace everything from point `first` on; false when points before `first` are missing. */
+  splice(first: number, positions: ArrayLike<number>): boolean {
+    if (first > this.count) return false;
+    const length = 3 * first + positions.length;
+    if (length > this.#data.length) this.#grow(length);
+    this.#data.set(positions, 3 * first);
+    this.#length = length;
+    return true;
+  }
+
+  #grow(length: number): void {
+    const larger = new Float32Array(Math.max(length, 2 * this.#data.length));
+    larger.set(this.coordinates);
+    this.#data = larger;
+  }
+}
+
+export interface DrawnCurve {
+  readonly index: number;
+  boundary: boolean;
+  closed: boolean;
+  ended: boolean;
+  readonly points: Points;
+}
+
+export interface DrawnNode {
+  readonly node: number;
+  readonly position: readonly [number, number, number];
+}
+
+/** What a message did to the network as drawn. */
+export type Change = "none" | "grown" | "replaced" | "gap";
+
+/** The curves and nodes of a session as they are drawn: a plain fold over the live messages. */
+export class Network {
+  readonly curves = new Map<number, DrawnCurve>();
+  readonly nodes = new Map<number, DrawnNode>();
+
+  /** Fold one message in; "gap" means that points are missing and a fresh snapshot is needed. */
+  apply(message: ToBrowser): Change {
+    switch (message.type) {
+      case "live.snapshot":
+      case "live.network":
+        return this.#replace(message.curves, message.nodes);
+      case "live.curve.start":
+        return this.#set({ ...message, closed: false, ended: false, positions: [] });
+      case "live.points":
+        return this.curves.get(message.index)?.points.splice(message.first, message.positions) ? "grown" : "gap";
+      case "live.curve.end":
+        return this.#end(message.index, message.closed);
+      case "live.node":
+        this.nodes.set(message.node.node, message.node);
+        return "grown";
+      default:
+        return "none";
+    }
+  }
+
+  #replace(curves: readonly LiveCurve[], nodes: readonly NodePosition[]): Change {
+    this.curves.clear();
+    this.nodes.clear();
+    for (const curve of curves) this.#set(curve);
+    for (const node of nodes) this.nodes.set(node.node, node);
+    return "replaced";
+  }
+
+  #set(curve: LiveCurve): Change {
+    const { index, boundary, closed, ended, positions } = curve;
+    this.curves.set(index, { index, boundary, closed, ended, points: new Points(positions) });
+    return "grown";
+  }
+
+  #end(index: number, closed: boolean): Change {
+    const curve = this.curves.get(index);
+    if (!curve) return "gap";
+    curve.closed = closed;
+    curve.ended = true;
+    return "grown";
+  }
+}

@@ -1,0 +1,77 @@
+import type { Api } from "../protocol/api";
+import type { Reconstruction } from "../wire.gen";
+import { Network } from "./network";
+
+/** What a reconstruction left, as far as the page needs it. */
+export interface Result {
+  readonly reconstruction: Reconstruction;
+  readonly report: Report;
+  readonly network: Network;
+  readonly normals: Float32Array;
+  readonly positions: Float32Array;
+  readonly meshUrl: string | undefined;
+}
+
+/** The parts of report.json that the page reads; everything may be missing. */
+export interface Report {
+  readonly seconds?: number;
+  readonly network?: Record<string, unknown>;
+  readonly surface?: Record<string, unknown>;
+}
+
+/** A network JSON file (docs: formats). */
+export interface NetworkFile {
+  readonly points: readonly (readonly [number, number, number])[];
+  readonly normals: readonly (readonly [number, number, number])[];
+  readonly nodes: readonly number[];
+  readonly segments: readonly { readonly points: readonly number[]; readonly boundary: boolean; readonly curve: number }[];
+}
+
+/** Fetch the artifacts of a finished reconstruction. */
+export async function loadResult(api: Api, reconstruction: Reconstruction): Promise<Result> {
+  const { artifacts } = reconstruction;
+  const [file, report] = await Promise.all([
+    api.artifact<NetworkFile>(artifacts["network.json"] ?? ""),
+    api.artifact<Report>(artifacts["report.json"] ?? ""),
+  ]);
+  return {
+    reconstruction,
+    report,
+    network: networkFromFile(file),
+    positions: Float32Array.from(file.points.flat()),
+    normals: Float32Array.from(file.normals.flat()),
+    meshUrl: artifacts["mesh.glb"],
+  };
+}
+
+/** The drawn form of a network file: the segments of a scanned curve joined into one polyline where they meet. */
+export function networkFromFile(file: NetworkFile): Network {
+  const network = new Network();
+  let spare = Math.max(0, ...file.segments.map((segment) => segment.curve)) + 1;
+  const chains = new Map<number, { points: number[]; boundary: boolean }>();
+  for (const { points, boundary, curve } of file.segments) {
+    const chain = chains.get(curve);
+    if (!chain) chains.set(curve, { points: [...points], boundary });
+    else if (chain.points.at(-1) === points[0]) chain.points.push(...points.slice(1));
+    else chains.set(spare++, { points: [...points], boundary });
+  }
+  network.apply({
+    type: "live.network",
+    curves: [...chains].map(([index, { points, boundary }]) => ({
+      index,
+      boundary,
+      closed: points[0] === points.at(-1),
+      ended: true,
+      positions: points.flatMap((i) => [...(file.points[i] ?? [])]),
+    })),
+    nodes: file.nodes.map((point, node) => ({ node, position: [...(file.points[point] ?? [0, 0, 0])] })),
+  });
+  return network;
+}
+
+
+/** Warnings of both halves of the pipeline. */
+export function warningsOf(report: Report): string[] {
+  const lists = [report.network?.["warnings"], report.surface?.["warnings"]];
+  return lists.flatMap((list) => (Array.isArray(list) ? list.map(String) : []));
+}

@@ -1,0 +1,157 @@
+import { type Api, ApiProblem } from "../protocol/api";
+import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
+import type { ToBrowser } from "../protocol/messages";
+import { polylineLength } from "../geometry/vectors";
+import type { LiveDevice, Reconstruction, ReconstructionParameters, Session } from "../wire.gen";
+import { Network } from "./network";
+import { loadResult, type Result } from "./result";
+
+/** A curve as the list of curves names it. */
+export interface CurveEntry {
+  readonly index: number;
+  readonly boundary: boolean;
+  readonly closed: boolean;
+  readonly ended: boolean;
+  /** m, as drawn. */
+  readonly length: number;
+}
+
+const LIST_PAUSE = 250;
+
+/** Everything about the session that is open. High-rate data (points) stays outside the reactive graph; `revision`
+ * tells those who draw it that it changed. */
+export class SessionStore {
+  readonly live = new Network();
+  session = $state<Session>();
+  connection = $state<Connection>("connecting");
+  devices = $state.raw<readonly LiveDevice[]>([]);
+  curves = $state.raw<readonly CurveEntry[]>([]);
+  nodes = $state.raw<readonly number[]>([]);
+  reconstruction = $state.raw<Reconstruction>();
+  result = $state.raw<Result>();
+  problem = $state("");
+  /** Counts changes of the drawn network. */
+  revision = $state(0);
+  /** Counts those changes after which points lie elsewhere. */
+  replacements = $state(0);
+  #socket: LiveSocket | undefined;
+  #listTimer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(
+    private readonly api: Api,
+    readonly id: string,
+  ) {}
+
+  /** True while a curve is being scanned. */
+  get scanning(): boolean {
+    return this.curves.some((curve) => !curve.ended);
+  }
+
+  /** What is drawn: the reconstructed network once there is one and nothing was scanned since, else the live one. */
+  get network(): Network {
+    return this.result?.network ?? this.live;
+  }
+
+  async open(): Promise<void> {
+    await this.#attempt(async () => {
+      this.session = await this.api.session(this.id);
+      const url = socketUrl(`/api/v1/sessions/${this.id}/live`, location);
+      this.#socket = new LiveSocket(url, { message: (m) => this.receive(m), state: (s) => (this.connection = s) });
+      const latest = this.session.latest_reconstruction;
+      if (latest) await this.#show(await this.api.reconstruction(latest));
+    });
+  }
+
+  close(): void {
+    clearTimeout(this.#listTimer);
+    this.#socket?.close();
+  }
+
+  receive(message: ToBrowser): void {
+    switch (message.type) {
+      case "live.device":
+        this.#heard([message]);
+        break;
+      case "live.reconstruction":
+        this.#progressed(message.reconstruction);
+        break;
+      default:
+        this.#fold(message);
+    }
+  }
+
+  async rename(name: string): Promise<void> {
+    await this.#attempt(async () => (this.session = await this.api.renameSession(this.id, name)));
+  }
+
+  async reconstruct(parameters: Partial<ReconstructionParameters>): Promise<void> {
+    await this.#attempt(async () => this.#progressed(await this.api.reconstruct(this.id, parameters)));
+  }
+
+  async cancel(): Promise<void> {
+    const { reconstruction } = this;
+    if (reconstruction) await this.#attempt(async () => this.#progressed(await this.api.cancel(reconstruction.id)));
+  }
+
+  #fold(message: Exclude<ToBrowser, LiveDevice | { type: "live.reconstruction" }>): void {
+    const change = this.live.apply(message);
+    if (change === "gap") return this.#socket?.restart();
+    if (message.type === "live.snapshot") {
+      this.#heard(message.devices);
+      if (message.reconstruction) this.#progressed(message.reconstruction);
+    }
+    if (message.type === "live.curve.start" || message.type === "live.points") this.result = undefined;
+    if (change === "replaced") this.replacements += 1;
+    this.revision += 1;
+    this.#listSoon();
+  }
+
+  #heard(devices: readonly LiveDevice[]): void {
+    const others = this.devices.filter((old) => !devices.some((device) => device.recording === old.recording));
+    this.devices = [...others, ...devices].sort((a, b) => a.recording.localeCompare(b.recording));
+  }
+
+  #progressed(reconstruction: Reconstruction): void {
+    this.reconstruction = reconstruction;
+    if (reconstruction.state === "done") void this.#attempt(() => this.#show(reconstruction));
+  }
+
+  async #show(reconstruction: Reconstruction): Promise<void> {
+    if (this.result?.reconstruction.id === reconstruction.id) return;
+    this.reconstruction ??= reconstruction;
+    this.result = await loadResult(this.api, reconstruction);
+    this.replacements += 1;
+    this.revision += 1;
+  }
+
+  /** The list of curves changes with every message; a person reads it a few times a second. */
+  #listSoon(): void {
+    this.#listTimer ??= setTimeout(() => {
+      this.#listTimer = undefined;
+      this.curves = [...this.live.curves.values()].map((curve) => ({
+        index: curve.index,
+        boundary: curve.boundary,
+        closed: curve.closed,
+        ended: curve.ended,
+        length: polylineLength(curve.points.coordinates),
+      }));
+      this.nodes = [...this.live.nodes.keys()].sort((a, b) => a - b);
+    }, LIST_PAUSE);
+  }
+
+  async #attempt(work: () => Promise<unknown>): Promise<void> {
+    try {
+      await work();
+      this.problem = "";
+    } catch (error) {
+      this.problem = inWords(error);
+    }
+  }
+}
+
+/** An error in words for the person in front of the screen. */
+export function inWords(error: unknown): string {
+  if (error instanceof ApiProblem) return error.message;
+  if (error instanceof TypeError) return "The server does not answer. Is it running?";
+  return error instanceof Error ? error.message : String(error);
+}

@@ -1,0 +1,486 @@
+/* Generated from the server's models by `npm run wire`; do not edit. */
+
+/**
+ * Every message up to and including `seq` is committed to durable storage.
+ */
+export interface Ack {
+  seq: number;
+  type: "ack";
+}
+/**
+ * One scanned curve of a session.
+ */
+export interface Curve {
+  boundary: boolean;
+  closed: boolean;
+  ended: boolean;
+  /**
+   * number within the session, in order of scanning
+   */
+  index: number;
+  /**
+   * m, as the odometer saw it
+   */
+  length: number;
+  marks: Mark[];
+  recording: string;
+  samples: number;
+}
+/**
+ * A node marked on a curve.
+ */
+export interface Mark {
+  node: number;
+  sample: number;
+}
+/**
+ * A curve ends.
+ */
+export interface CurveEnd {
+  /**
+   * the curve ends where it began
+   */
+  closed: boolean;
+  curve: number;
+  /**
+   * the curve was a mistake: kept as sent, left out of the scan
+   */
+  discard: boolean;
+  seq: number;
+  type: "curve.end";
+}
+/**
+ * A curve begins; its samples and nodes refer to its number.
+ */
+export interface CurveStart {
+  /**
+   * the curve bounds the surface
+   */
+  boundary: boolean;
+  /**
+   * number of the curve within the recording: 0, 1, 2, ...
+   */
+  curve: number;
+  seq: number;
+  type: "curve.start";
+}
+/**
+ * PATCH /sessions/{session}/curves/{index}; absent fields stay.
+ */
+export interface CurveUpdate {
+  boundary: boolean | null;
+  closed: boolean | null;
+  /**
+   * replace all marks of the curve
+   */
+  marks: Mark[] | null;
+  /**
+   * left out of everything; its samples stay stored
+   */
+  removed: boolean | null;
+}
+/**
+ * Who measures, and what is needed to read its numbers.
+ */
+export interface Device {
+  id: string;
+  /**
+   * morphorider, phone, sensorserver, file, ...
+   */
+  kind: string;
+  /**
+   * [w, x, y, z]: turns the axes (tangent, normal, B) into the device's own axes
+   *
+   * @minItems 4
+   * @maxItems 4
+   */
+  mounting: [number, number, number, number];
+  name: string;
+  reference: Reference;
+  /**
+   * present when the device counts wheel ticks
+   */
+  wheel: Wheel | null;
+}
+/**
+ * Directions in the world (ENU) that the accelerometer and the magnetometer see at rest.
+ */
+export interface Reference {
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  acceleration: [number, number, number];
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  magnetic: [number, number, number];
+}
+/**
+ * An odometer wheel: distance = (big + small / ticks_per_turn) * circumference.
+ */
+export interface Wheel {
+  /**
+   * m, travelled in one turn
+   */
+  circumference: number;
+  ticks_per_turn: number;
+}
+/**
+ * Why the server closes the connection.
+ */
+export interface ErrorMessage {
+  code: "version" | "malformed" | "gap" | "limit" | "forbidden" | "storage" | "unknown";
+  /**
+   * with `gap`: the number that was wanted
+   */
+  expected_seq: number | null;
+  message: string;
+  type: "error";
+}
+/**
+ * First message of every connection and first line of every recording.
+ */
+export interface Hello {
+  device: Device;
+  /**
+   * chosen by the device, kept in its spool, the same after a restart
+   */
+  recording: string;
+  /**
+   * session to record into; none: the server makes one
+   */
+  session: string | null;
+  type: "hello";
+  versions: number[];
+}
+/**
+ * One curve as drawn: dead reckoning while it is scanned, consistent once the network was solved.
+ */
+export interface LiveCurve {
+  boundary: boolean;
+  closed: boolean;
+  ended: boolean;
+  index: number;
+  positions: number[];
+}
+/**
+ * A curve ends.
+ */
+export interface LiveCurveEnd {
+  closed: boolean;
+  index: number;
+  type: "live.curve.end";
+}
+/**
+ * A curve begins.
+ */
+export interface LiveCurveStart {
+  boundary: boolean;
+  index: number;
+  type: "live.curve.start";
+}
+/**
+ * Health of a device that records into the session.
+ */
+export interface LiveDevice {
+  /**
+   * mean of |acceleration|, the device's own unit
+   */
+  acceleration_norm: number | null;
+  /**
+   * s since the last sample arrived
+   */
+  age: number;
+  /**
+   * rad, angle of the field below the horizontal
+   */
+  dip: number | null;
+  kind: string;
+  /**
+   * mean of |magnetic|, the device's own unit
+   */
+  magnetic_norm: number | null;
+  name: string;
+  /**
+   * samples per second, measured over the last second
+   */
+  rate: number;
+  recording: string;
+  state: "live" | "stale" | "lost";
+  type: "live.device";
+}
+/**
+ * All curves and nodes after the network was solved again; replaces everything drawn before.
+ */
+export interface LiveNetwork {
+  curves: LiveCurve[];
+  nodes: NodePosition[];
+  type: "live.network";
+}
+/**
+ * Where a node is, as far as known.
+ */
+export interface NodePosition {
+  node: number;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  position: [number, number, number];
+}
+/**
+ * A node was marked.
+ */
+export interface LiveNode {
+  /**
+   * curve
+   */
+  index: number;
+  node: NodePosition;
+  type: "live.node";
+}
+/**
+ * New points at the end of a curve.
+ */
+export interface LivePoints {
+  /**
+   * number of the first of these points within the curve as drawn
+   */
+  first: number;
+  index: number;
+  positions: number[];
+  type: "live.points";
+}
+/**
+ * A reconstruction was created, made progress, or ended.
+ */
+export interface LiveReconstruction {
+  reconstruction: Reconstruction;
+  type: "live.reconstruction";
+}
+/**
+ * A reconstruction of a session: a job, and its results once it is done.
+ */
+export interface Reconstruction {
+  /**
+   * file name -> URL: network.json, mesh.glb, report.json
+   */
+  artifacts: {
+    [k: string]: string;
+  };
+  created: string;
+  /**
+   * why it failed, in words for people
+   */
+  error: string | null;
+  finished: string | null;
+  fraction: number;
+  id: string;
+  parameters: ReconstructionParameters;
+  session: string;
+  /**
+   * what is being done, in words
+   */
+  stage: string;
+  state: "queued" | "running" | "done" | "failed" | "cancelled";
+}
+/**
+ * What a person may choose; everything left out is chosen automatically and reported.
+ */
+export interface ReconstructionParameters {
+  /**
+   * smoothing length of the bend term, m
+   */
+  bend: number | null;
+  curve_bias: "auto" | "on" | "off";
+  /**
+   * let the surface leave a noisy network a little
+   */
+  soft: boolean;
+  /**
+   * distance of the network's points: % of the estimated diagonal, or m
+   */
+  step: string;
+  /**
+   * smoothing length of the stretch term, m
+   */
+  stretch: number | null;
+  /**
+   * also span the surface, not only the network
+   */
+  surface: boolean;
+  weights: "auto" | "thesis";
+}
+/**
+ * A node was marked at a sample of a curve; nodes with the same number are the same point of the object.
+ */
+export interface NodeMark {
+  curve: number;
+  node: number;
+  /**
+   * number of the sample within its curve
+   */
+  sample: number;
+  seq: number;
+  type: "node";
+  /**
+   * takes back the mark of this node at this sample: it was a mistake
+   */
+  undo: boolean;
+}
+/**
+ * RFC 9457 problem details: the one error envelope of the API.
+ */
+export interface Problem {
+  detail: string;
+  /**
+   * per field: where, what was wanted, what came
+   */
+  errors: {
+    [k: string]: unknown;
+  }[];
+  instance: string;
+  status: number;
+  title: string;
+  type: string;
+}
+/**
+ * A recording of a session: what one device sent, or one uploaded file.
+ */
+export interface RecordingSummary {
+  bytes: number;
+  created: string;
+  device: Device;
+  id: string;
+  messages: number;
+  session: string;
+}
+/**
+ * Directions in the world (ENU) that the accelerometer and the magnetometer see at rest.
+ */
+export interface Reference1 {
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  acceleration: [number, number, number];
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  magnetic: [number, number, number];
+}
+/**
+ * A block of samples; every column that is present has one entry per sample.
+ *
+ * Orientation comes as `acceleration` and `magnetic`, or as `quaternion`, or as `tangent` and `normal`; distance as
+ * `ticks` or `distance`, or not at all (then constant speed along each segment is assumed).
+ */
+export interface Samples {
+  /**
+   * device axes, up at rest; any unit
+   */
+  acceleration: [number, number, number][] | null;
+  curve: number;
+  /**
+   * m along the curve
+   */
+  distance: number[] | null;
+  /**
+   * number of the block's first sample within its curve
+   */
+  first_sample: number;
+  /**
+   * device axes; any unit
+   */
+  magnetic: [number, number, number][] | null;
+  /**
+   * unit, outward, world (ENU)
+   */
+  normal: [number, number, number][] | null;
+  /**
+   * [w, x, y, z], device to ENU
+   */
+  quaternion: [number, number, number, number][] | null;
+  /**
+   * s since 1970 UTC, when the bridge had the sample
+   */
+  received: number[] | null;
+  /**
+   * rad/s, device axes
+   */
+  rotation_rate: [number, number, number][] | null;
+  seq: number;
+  /**
+   * unit, world (ENU)
+   */
+  tangent: [number, number, number][] | null;
+  /**
+   * wheel: [big (turns), small]
+   */
+  ticks: [number, number][] | null;
+  /**
+   * s, the device's own clock
+   */
+  time: number[] | null;
+  type: "samples";
+}
+/**
+ * One object being scanned.
+ */
+export interface Session {
+  created: string;
+  curves: number;
+  id: string;
+  /**
+   * newest one that is done
+   */
+  latest_reconstruction: string | null;
+  name: string;
+  /**
+   * distinct node numbers marked
+   */
+  nodes: number;
+  samples: number;
+}
+/**
+ * POST /sessions.
+ */
+export interface SessionCreate {
+  /**
+   * chosen by the caller; none: the server chooses
+   */
+  id: string | null;
+  name: string;
+}
+/**
+ * PATCH /sessions/{session}; absent fields stay.
+ */
+export interface SessionUpdate {
+  name: string | null;
+}
+/**
+ * Everything a late joiner needs.
+ */
+export interface Snapshot {
+  curves: LiveCurve[];
+  devices: LiveDevice[];
+  nodes: NodePosition[];
+  reconstruction: Reconstruction | null;
+  session: string;
+  type: "live.snapshot";
+}
+/**
+ * The server's answer to hello.
+ */
+export interface Welcome {
+  /**
+   * number of the first message that the server does not have
+   */
+  next_seq: number;
+  session: string;
+  type: "welcome";
+  version: number;
+}
