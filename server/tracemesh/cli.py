@@ -134,7 +134,10 @@ def _add_simulate(commands: Commands) -> None:
     parser.add_argument("--truth", type=Path, metavar="TRUTH.obj", help="also write the true mesh")
     parser.add_argument("--recording", type=Path, metavar="SCAN.ndjson", help="also write what the device sends")
     parser.add_argument(
-        "--noise", type=float, default=0.015, help="of a unit vector, per axis (default 0.015; 0: exact)"
+        "--noise",
+        type=float,
+        default=0.015,
+        help="of a unit vector, per axis; outliers, headings and marks go with it (default 0.015; 0: an exact device)",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
     parser.set_defaults(command=_simulate)
@@ -232,7 +235,23 @@ def _evaluate(chosen: argparse.Namespace) -> int:
 
 
 def _simulate(chosen: argparse.Namespace) -> int:
-    raise AssertionError
+    from tracemesh.formats.meshes import write_truth
+    from tracemesh.formats.rawnet import write_rawnet
+    from tracemesh.formats.recordings import recording_from_simulation, scan_from_recordings, write_recording
+    from tracemesh.geometry.shapes import SHAPES
+    from tracemesh.geometry.simulation import Imperfections, plan_scan, simulate_scan
+
+    shape = SHAPES[chosen.shape]()
+    imperfections = Imperfections().scaled(chosen.noise / Imperfections.vector)
+    simulated = simulate_scan(plan_scan(shape, imperfections=imperfections, seed=chosen.seed), chosen.seed)
+    recording = recording_from_simulation(simulated, f"{chosen.shape}-{chosen.seed}")
+    outputs = {chosen.output: write_rawnet(scan_from_recordings([recording])).encode()}
+    if chosen.recording:
+        outputs[chosen.recording] = write_recording(recording).encode()
+    if chosen.truth:
+        outputs[chosen.truth] = write_truth(*shape.mesh(), chosen.truth.suffix.lower().lstrip("."))
+    write_all(outputs)
+    return 0
 
 
 def _serve(chosen: argparse.Namespace) -> int:

@@ -59,7 +59,7 @@ def reconstruct(
     curves = reconstruct_network(scan, network_parameters(parameters), _part(report, 0.0, NETWORK_SHARE))
     result = Reconstruction(curves.network, None, {"generator": _generator(), "network": curves.report})
     if parameters.surface:
-        result = _with_surface(result, SurfaceParameters(soft=parameters.soft), _part(report, NETWORK_SHARE, 1.0))
+        result = _with_surface(result, SurfaceParameters(), _part(report, NETWORK_SHARE, 1.0))
     result.report["seconds"] = perf_counter() - begin
     report("done", 1.0)
     return result

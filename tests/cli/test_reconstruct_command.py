@@ -1,0 +1,152 @@
+"""`tracemesh reconstruct`, `surface` and `evaluate` as a stranger runs them: real processes, real files."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+
+def tracemesh(*arguments: object, stdin: str | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tracemesh", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, input=stdin, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def lilium(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The thesis author's own network, reconstructed into a folder."""
+    folder = tmp_path_factory.mktemp("lilium")
+    done = tracemesh(
+        "reconstruct",
+        *(shared_data / "lilium.rawnet", "-o", folder / "lilium.glb"),
+        *("--network", folder / "network.json", "--report", folder / "report.json"),
+    )
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    return folder
+
+
+def test_the_network_is_on_the_true_surface(lilium: Path, shared_data: Path) -> None:
+    truth = shared_data / "lilium.obj"
+    done = tracemesh("evaluate", lilium / "network.json", "--truth", truth, "--align", "rigid", "--json")
+    measured = json.loads(done.stdout)
+    assert measured["unit"] == "percent of the truth's diagonal"
+    assert measured["mean"] <= 0.02
+    assert measured["min"] <= measured["mean"] <= measured["rms"] <= measured["max"]
+
+
+def test_the_mesh_is_one_oriented_disk(lilium: Path) -> None:
+    mesh = trimesh.load(lilium / "lilium.glb", force="mesh", process=True)
+    edges, count = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
+    assert count.max() == 2
+    assert mesh.is_winding_consistent
+    assert mesh.euler_number == 1
+    rim = edges[count == 1]
+    assert (np.unique(rim, return_counts=True)[1] == 2).all()
+    loops = trimesh.graph.connected_components(rim)
+    assert len(loops) == 1
+
+
+def test_the_report_says_what_was_used(lilium: Path) -> None:
+    report = json.loads((lilium / "report.json").read_text())
+    assert report["generator"].startswith("tracemesh ")
+    assert report["seconds"] > 0
+    assert report["network"]["parameters"]["step"] > 0
+    assert report["surface"]["euler_number"] == 1
+
+
+@pytest.mark.parametrize("extension", ["obj", "ply", "stl"])
+def test_every_mesh_format_holds_the_same_surface(lilium: Path, extension: str, tmp_path: Path) -> None:
+    done = tracemesh("surface", lilium / "network.json", "-o", tmp_path / f"mesh.{extension}")
+    assert done.returncode == 0, done.stderr
+    written = trimesh.load(tmp_path / f"mesh.{extension}", force="mesh")
+    glb = trimesh.load(lilium / "lilium.glb", force="mesh")
+    z_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    assert written.area == pytest.approx(glb.area, rel=1e-5)
+    np.testing.assert_allclose(written.bounds, np.sort(glb.bounds @ z_up.T, axis=0), atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "cone", "bumpy", "lilium", "lilium7"])
+def test_a_noisy_scan_becomes_a_surface(shared_data: Path, tmp_path: Path, name: str) -> None:
+    done = tracemesh("reconstruct", shared_data / f"scans/{name}-noisy.rawnet", "-o", tmp_path / "mesh.glb")
+    assert done.returncode == 0, done.stderr
+    mesh = trimesh.load(tmp_path / "mesh.glb", force="mesh", process=True)
+    assert mesh.is_winding_consistent
+    assert mesh.euler_number == 1
+
+
+def test_standard_input_and_a_network_only(shared_data: Path, tmp_path: Path) -> None:
+    text = (shared_data / "lilium.rawnet").read_text()
+    output = ("-o", tmp_path / "no.glb", "--network", tmp_path / "network.json")
+    done = tracemesh("reconstruct", "-", *output, "--no-surface", stdin=text)
+    assert done.returncode == 0, done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["network.json"]
+
+
+def lilium_with(change: str, text: str) -> str:
+    """The author's file with one fault."""
+    lines = text.splitlines()
+    row = next(i for i, line in enumerate(lines) if len(line.split()) == 7)
+    match change:
+        case "truncated":
+            return "\n".join(lines[: row + 20])
+        case "letter":
+            lines[row + 4] = lines[row + 4].replace("0.", "0x", 1)
+        case "node index":
+            lines[4] = lines[4].replace("187", "9187")
+        case "not finite":
+            lines[row + 4] = " ".join(["nan", *lines[row + 4].split()[1:]])
+        case "two pieces":
+            lines = _renumber_second_curve(lines)
+        case "not closed":
+            lines[5] = lines[5].replace("0 4 1 2 0", "0 4 1 2 3")
+    return "\n".join(lines)
+
+
+def _renumber_second_curve(lines: list[str]) -> list[str]:
+    """Give the curves after the first one nodes that the first one does not have."""
+    headers = [i for i, line in enumerate(lines) if len(line.split()) != 7]
+    for start in (i for i in headers[6:] if i + 3 in headers and lines[i] in ("0", "1") and lines[i + 1] in ("0", "1")):
+        lines[start + 4] = " ".join(str(int(n) + 100) for n in lines[start + 4].split())
+    return lines
+
+
+@pytest.mark.parametrize(
+    ("change", "wanted"),
+    [
+        ("truncated", ["line", "curve 1"]),
+        ("letter", ["line", "curve 1"]),
+        ("node index", ["line 5", "curve 1", "9187"]),
+        ("not finite", ["line", "curve 1", "nan"]),
+        ("two pieces", ["curve"]),
+        ("not closed", ["curve 1", "closed"]),
+    ],
+)
+def test_a_wrong_rawnet_is_refused_with_its_place_and_nothing_is_written(
+    change: str, wanted: list[str], shared_data: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "out").mkdir()
+    scan = tmp_path / "in" / "wrong.rawnet"
+    scan.write_text(lilium_with(change, (shared_data / "lilium.rawnet").read_text()))
+    out = tmp_path / "out"
+    done = tracemesh("reconstruct", scan, "-o", out / "m.glb", "--network", out / "n.json", "--report", out / "r.json")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert [word for word in wanted if word not in done.stderr] == []
+    assert list(out.iterdir()) == []
+
+
+def test_usage_errors_exit_with_two(tmp_path: Path) -> None:
+    assert tracemesh("reconstruct", "scan.rawnet", "-o", "mesh.txt").returncode == 2
+    assert tracemesh("reconstruct", "scan.rawnet", "-o", "m.glb", "--step", "wide").returncode == 2
+    assert tracemesh().returncode == 2
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    done = tracemesh("reconstruct", tmp_path / "none.rawnet", "-o", tmp_path / "m.glb")
+    assert done.returncode == 1
+    assert "none.rawnet" in done.stderr
+    assert "Traceback" not in done.stderr
