@@ -1,0 +1,80 @@
+"""How well a device does: what the operator sees beside the counts."""
+
+import math
+from collections import Counter, deque
+from itertools import pairwise
+
+from tracemesh.wire.base import Vector
+from tracemesh_bridge.source import Reading
+
+WINDOW_SECONDS = 2.0
+
+
+class Health:
+    """Rate, jitter, age, field strengths, dip, clock offset and faults over the last two seconds."""
+
+    def __init__(self) -> None:
+        """Nothing received yet."""
+        self.faults: Counter[str] = Counter()
+        self.received = 0
+        self._recent: deque[Reading] = deque()
+
+    def take(self, reading: Reading) -> None:
+        """Take one reading into account."""
+        self.received += 1
+        self._recent.append(reading)
+        while self._recent[0].received < reading.received - WINDOW_SECONDS:
+            self._recent.popleft()
+
+    @property
+    def clock_offset(self) -> float | None:
+        """s, smallest of (arrival - device time) lately: between the two clocks, plus the quickest way here."""
+        return min((r.received - r.time for r in self._recent if r.time is not None), default=None)
+
+    def fault(self, kind: str) -> None:
+        """Count something that went wrong: late, short, surplus, implausible, ..."""
+        self.faults[kind] += 1
+
+    def rate(self, now: float) -> float:
+        """Readings per second over the last two seconds."""
+        return sum(r.received > now - WINDOW_SECONDS for r in self._recent) / WINDOW_SECONDS
+
+    def describe(self, now: float) -> str:
+        """One line for the operator."""
+        if not self._recent:
+            return "no sample yet"
+        parts = [f"{self.rate(now):.1f} Hz", f"jitter {1000 * self._jitter():.1f} ms"]
+        parts.append(f"age {now - self._recent[-1].received:.1f} s")
+        parts.extend(self._field())
+        parts.extend(f"{count} {kind}" for kind, count in sorted(self.faults.items()))
+        return "  ".join(parts)
+
+    def _jitter(self) -> float:
+        times = [r.received if r.time is None else r.time for r in self._recent]
+        gaps = [b - a for a, b in pairwise(times)]
+        if len(gaps) < 2:
+            return 0.0
+        mean = sum(gaps) / len(gaps)
+        return math.sqrt(sum((g - mean) ** 2 for g in gaps) / len(gaps))
+
+    def _field(self) -> list[str]:
+        pairs = [
+            (r.acceleration, r.magnetic)
+            for r in self._recent
+            if r.acceleration is not None and r.magnetic is not None and any(r.acceleration) and any(r.magnetic)
+        ]
+        if not pairs:
+            return []
+        dips = [dip(a, m) for a, m in pairs]
+        return [
+            f"|acc| {sum(math.hypot(*a) for a, _ in pairs) / len(pairs):.3g}",
+            f"|mag| {sum(math.hypot(*m) for _, m in pairs) / len(pairs):.3g}",
+            f"dip {math.degrees(sum(dips) / len(dips)):.1f}°",
+        ]
+
+
+def dip(acceleration: Vector, magnetic: Vector) -> float:
+    """Angle of the field below the horizontal, rad, from the two vectors a device measures at rest (any units)."""
+    norm = math.hypot(*acceleration) * math.hypot(*magnetic)
+    cosine = sum(a * m for a, m in zip(acceleration, magnetic, strict=True)) / norm
+    return math.asin(max(-1.0, min(1.0, -cosine)))
