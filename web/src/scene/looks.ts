@@ -50,7 +50,7 @@ export const looks: readonly Look[] = [
     hint: "A ceiling of parallel lamps, mirrored in the surface",
     chunk: `${LIT} vec3 look(vec3 n, vec3 v) {
       vec3 r = reflect(-v, n);
-      float band = stripes(5.0 * atan(r.x, r.y + 1.6));
+      float band = stripes(8.0 * atan(r.x, r.y + 1.6));
       return mix(vec3(0.02), vec3(0.95), band) * (0.75 + 0.25 * max(dot(n, v), 0.0));
     }`,
   },

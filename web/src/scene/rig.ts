@@ -3,7 +3,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Box } from "../geometry/vectors";
 
 const FIELD_OF_VIEW = 32;
-const MARGIN = 1.2;
+const MARGIN = 1.06;
 /** Half-life of the way that is left, s. */
 const HALF_LIFE = 0.11;
 const FIRST_DIRECTION = new Vector3(0.55, -1, 0.62).normalize();

@@ -1,0 +1,68 @@
+import { describe, expect, it } from "vitest";
+import type { ToBrowser } from "../protocol/messages";
+import { Network, Points } from "./network";
+
+const start = (index: number, boundary = false): ToBrowser => ({ type: "live.curve.start", index, boundary });
+const points = (index: number, first: number, positions: number[]): ToBrowser => ({
+  type: "live.points",
+  index,
+  first,
+  positions,
+});
+
+describe("Points", () => {
+  it("grow as a plain list does", () => {
+    const growing = new Points();
+    const plain: number[] = [];
+    for (let i = 0; i < 500; i += 1) {
+      const block = [i, 2 * i, 3 * i, i + 0.5, 0, 1];
+      expect(growing.splice(plain.length / 3, block)).toBe(true);
+      plain.push(...block);
+    }
+    expect(growing.count).toBe(1000);
+    expect([...growing.coordinates]).toEqual(plain);
+  });
+
+  it("are overwritten from a point on, and refuse to leave a gap", () => {
+    const growing = new Points([0, 0, 0, 1, 1, 1, 2, 2, 2]);
+    expect(growing.splice(1, [9, 9, 9])).toBe(true);
+    expect([...growing.coordinates]).toEqual([0, 0, 0, 9, 9, 9]);
+    expect(growing.splice(3, [5, 5, 5])).toBe(false);
+    expect(growing.count).toBe(2);
+  });
+});
+
+describe("Network", () => {
+  it("draws a curve as it is scanned", () => {
+    const network = new Network();
+    expect(network.apply(start(0, true))).toBe("grown");
+    network.apply(points(0, 0, [0, 0, 0, 1, 0, 0]));
+    network.apply(points(0, 2, [1, 1, 0]));
+    network.apply({ type: "live.node", index: 0, node: { node: 4, position: [1, 0, 0] } });
+    network.apply({ type: "live.curve.end", index: 0, closed: true });
+    const curve = network.curves.get(0);
+    expect(curve).toMatchObject({ boundary: true, closed: true, ended: true });
+    expect([...(curve?.points.coordinates ?? [])]).toEqual([0, 0, 0, 1, 0, 0, 1, 1, 0]);
+    expect(network.nodes.get(4)?.position).toEqual([1, 0, 0]);
+  });
+
+  it("asks for a fresh snapshot when points are missing or their curve is unknown", () => {
+    const network = new Network();
+    network.apply(start(0));
+    expect(network.apply(points(0, 1, [0, 0, 0]))).toBe("gap");
+    expect(network.apply(points(5, 0, [0, 0, 0]))).toBe("gap");
+    expect(network.apply({ type: "live.curve.end", index: 5, closed: false })).toBe("gap");
+  });
+
+  it("is replaced as a whole after it was solved again", () => {
+    const network = new Network();
+    network.apply(start(0));
+    network.apply(start(1));
+    const solved = { index: 1, boundary: true, closed: false, ended: true, positions: [1, 2, 3] };
+    const nodes = [{ node: 0, position: [1, 2, 3] as [number, number, number] }];
+    expect(network.apply({ type: "live.network", curves: [solved], nodes })).toBe("replaced");
+    expect([...network.curves.keys()]).toEqual([1]);
+    expect([...network.nodes.keys()]).toEqual([0]);
+    expect(network.apply(points(1, 1, [4, 5, 6]))).toBe("grown");
+  });
+});
