@@ -1,0 +1,175 @@
+"""The whole bridge against a real pseudo-terminal and a real WebSocket: whatever dies, every sample arrives once."""
+
+import resource
+import signal
+
+import pytest
+
+from tracemesh.wire.device import CurveEnd, CurveStart, ErrorMessage, NodeMark
+
+
+def is_slice(part, whole):
+    """Whether `part` is a run of `whole` without anything left out."""
+    start = whole.index(part[0])
+    return whole[start : start + len(part)] == part
+
+
+def missing(part, whole):
+    """How many frames of the run of `whole` that `part` covers are not in it; fails if they are in another order."""
+    places = [whole.index(frame) for frame in part]
+    assert places == sorted(set(places))
+    return places[-1] - places[0] + 1 - len(places)
+
+
+def record_a_curve(bench, bridge, samples=80):
+    bridge.says("device: live")
+    bridge.type("-")
+    bench.samples(samples)
+
+
+def test_what_the_device_sent_is_stored(bench):
+    bench.virtual()
+    bridge = bench.bridge("--session", "bowl", "--circumference", "0.2")
+    record_a_curve(bench, bridge)
+    bridge.type("3\n")
+    bench.samples(40)
+    bridge.type("14\n*+")
+    bench.samples(30)
+    bridge.type(".q")
+    assert bridge.wait() == 0
+    assert is_slice(bench.server.frames(0), bench.sent())
+    assert is_slice(bench.server.frames(1), bench.sent())
+    marks = [m for m in bench.server.messages if isinstance(m, NodeMark)]
+    assert [m.node for m in marks] == [3, 14]
+    assert 0 < marks[0].sample < marks[1].sample == len(bench.server.frames(0)) - 1
+    assert [m.boundary for m in bench.server.messages if isinstance(m, CurveStart)] == [True, False]
+    assert [m.closed for m in bench.server.messages if isinstance(m, CurveEnd)] == [True, False]
+    (hello,) = bench.server.hellos
+    assert (hello.session, hello.device.kind, hello.device.wheel.circumference) == ("bowl", "morphorider", 0.2)
+    assert bench.server.headers[0]["Authorization"] == "Bearer secret"
+    assert not list((bench.folder / "spool").glob("*/*")), "all is acknowledged: nothing may stay"
+
+
+def test_the_virtual_operator_drives_the_bridge(bench):
+    device = bench.virtual("--noise", "0")
+    bridge = bench.bridge()
+    bridge.says("device: live")
+    device.stop(signal.SIGTERM)
+    bridge.says("device: lost")
+    again = bench.virtual("--shape", "cone")
+    typed = 0
+    while len(bench.server.stored) == 0 or not any(isinstance(m, CurveEnd) for m in bench.server.messages):
+        bridge.type(again.keys[typed:].decode())
+        typed = len(again.keys)
+        bench.samples(1)
+    start, *marks, end = (m for m in bench.server.messages if isinstance(m, CurveStart | NodeMark | CurveEnd))
+    assert (start.curve, end.curve) == (0, 0)
+    assert len(marks) > 1
+
+
+@pytest.mark.parametrize("server_is_there", [True, False])
+def test_killed_in_mid_curve_it_goes_on_with_the_curve(bench, server_is_there):
+    bench.server.silent = not server_is_there
+    bench.virtual()
+    for _ in range(3):
+        bridge = bench.bridge()
+        bridge.says("device: live")
+        if "going on with curve 0" not in bridge.said:
+            bridge.type("+1\n")
+        bench.samples(57)
+        bridge.stop(signal.SIGKILL)
+    bench.server.silent = False
+    bridge = bench.bridge()
+    bridge.says("device: live")
+    bench.samples(20)
+    bridge.type("2\n.q")
+    assert bridge.wait() == 0
+    assert missing(bench.server.frames(0), bench.sent()) <= 3, "only the answer on its way at each of three kills"
+    assert [m.node for m in bench.server.messages if isinstance(m, NodeMark)] == [1, 2]
+    assert len(bench.server.stored) == 1, "one recording"
+
+
+def test_what_the_network_lost_is_sent_again(bench):
+    bench.server.drop_after, bench.server.lose = 5, 7
+    bench.virtual()
+    bridge = bench.bridge()
+    record_a_curve(bench, bridge, 200)
+    bridge.type(".q")
+    assert bridge.wait() == 0
+    assert is_slice(bench.server.frames(0), bench.sent())
+    assert len(bench.server.hellos) == 3
+    assert bridge.said.count("server: lost") == 2
+
+
+def test_without_a_server_it_records_and_sends_later(bench, make_server):
+    bench.virtual()
+    address, bench.server.port = bench.server.port, 1
+    bridge = bench.bridge()
+    record_a_curve(bench, bridge)
+    bridge.type(".q")
+    bridge.says("sending the rest")
+    assert bridge.stop(signal.SIGTERM) == 1
+    assert "messages wait in" in bridge.said
+    bench.server.port = address
+    bridge = bench.bridge()
+    bridge.says("server: live")
+    bridge.type("q")
+    assert bridge.wait() == 0
+    assert is_slice(bench.server.frames(0), bench.sent())
+
+
+def test_another_session_gets_a_recording_of_its_own_and_the_old_one_is_sent_too(bench, eventually):
+    bench.server.refusal = ErrorMessage(code="forbidden", message="this token may not record")
+    bench.virtual()
+    bridge = bench.bridge("--session", "first")
+    bridge.says("the server says forbidden: this token may not record")
+    record_a_curve(bench, bridge, 30)
+    bridge.type(".")
+    bridge.says("ended")
+    bridge.stop(signal.SIGINT)
+    bench.server.refusal = None
+    bridge = bench.bridge("--session", "second")
+    eventually(lambda: len(list((bench.folder / "spool").glob("*/"))) == 1)
+    bridge.type("q")
+    assert bridge.wait() == 0
+    first, second = (next(h for h in bench.server.hellos if h.session == s) for s in ("first", "second"))
+    assert [type(m) for m in bench.server.stored[first.recording]][-1] is CurveEnd
+    assert bench.server.stored[second.recording] == []
+
+
+def test_a_full_disk_is_said_and_costs_nothing_once_there_is_room(bench):
+    bench.virtual()
+    bridge = bench.bridge()
+    record_a_curve(bench, bridge, 50)
+    _, hard = resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE, (5000, hard))
+    bridge.says("cannot write the spool")
+    bench.samples(100)
+    resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE, (hard, hard))
+    bridge.says("spool: writes again")
+    bench.samples(20)
+    bridge.type(".q")
+    assert bridge.wait() == 0
+    assert is_slice(bench.server.frames(0), bench.sent())
+
+
+def test_unplugged_it_is_found_at_another_port(bench):
+    bench.virtual("--unplug", "120")
+    bridge = bench.bridge()
+    record_a_curve(bench, bridge, 60)
+    bridge.says("device: lost")
+    bridge.says("rider.1")
+    bench.samples(30)
+    bridge.type(".q")
+    assert bridge.wait() == 0
+    assert missing(bench.server.frames(0), bench.sent()) <= 1
+    assert bridge.said.count("device: lost") == 1
+
+
+def test_two_bridges_cannot_share_a_spool(bench):
+    bench.virtual()
+    bridge = bench.bridge()
+    bridge.says("device: live")
+    other = bench.bridge()
+    assert other.wait() == 1
+    assert "another bridge uses the spool" in other.said
