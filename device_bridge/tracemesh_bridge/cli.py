@@ -17,7 +17,7 @@ from tracemesh_bridge.framing import FrameLayout, read_layout
 from tracemesh_bridge.keys import KEYS_HELP
 from tracemesh_bridge.record import TOKEN_VARIABLE, Target, record
 from tracemesh_bridge.sources.morphorider import Morphorider, MorphoriderSettings
-from tracemesh_bridge.sources.virtual import FAULTS, SHAPES, VirtualSettings, run_virtual
+from tracemesh_bridge.sources.virtual import FAULTS, VirtualSettings, run_virtual
 
 DEFAULT_SERVER = "http://127.0.0.1:8000"
 
@@ -95,7 +95,7 @@ def _morphorider(args: argparse.Namespace) -> int:
 
 
 def _virtual_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--shape", choices=sorted(SHAPES), default="leaf", help="what it scans (default: %(default)s)")
+    command.add_argument("--shape", default="leaf", help="built-in shape that it scans (default: %(default)s)")
     command.add_argument("--link", type=Path, help="symbolic link to the port, for a name known beforehand")
     command.add_argument("--speed", type=_positive, default=1.0, help="times faster than life (default %(default)g)")
     command.add_argument(

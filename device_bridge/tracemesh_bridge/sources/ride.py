@@ -1,0 +1,131 @@
+"""The ride of a virtual Morphorider: where it is, what it answers, which keys its operator presses.
+
+Apart from the port because the simulation brings half of scipy with it, which no other command needs.
+"""
+
+import os
+import random
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from tracemesh.geometry import shapes
+from tracemesh.geometry.simulation import COUNTS, Handling, Imperfections, ScanPlan, plan_scan
+from tracemesh_bridge.errors import BridgeError
+from tracemesh_bridge.framing import Frame, FrameLayout, encode
+from tracemesh_bridge.sources.virtual import LATE_BY, VirtualSettings, say
+
+SHAPES: dict[str, Callable[[], shapes.Shape]] = {
+    f.__name__: f for f in (shapes.leaf, shapes.sphere, shapes.torus, shapes.cone, shapes.egg)
+}
+
+
+class Ride:
+    """Where the device is, what it answers, and which keys are due."""
+
+    def __init__(self, settings: VirtualSettings) -> None:
+        """The ride begins with the first request. Raises BridgeError if there is no such shape."""
+        self._plan = plan = _plan(settings)
+        self._settings = settings
+        self._generator = np.random.default_rng(settings.seed)
+        self._chance = random.Random(settings.seed)
+        self._layout = FrameLayout()
+        self._keys = list(operator_keys(plan))
+        self._began: float | None = None
+        self.requests = 0
+
+    @property
+    def duration(self) -> float:
+        """s that the ride takes."""
+        return self._plan.duration / self._settings.speed
+
+    @property
+    def time(self) -> float:
+        """s since the ride began with the first request."""
+        if self._settings.pace == "request":
+            return self.requests / self._plan.handling.rate
+        return 0.0 if self._began is None else (time.monotonic() - self._began) * self._settings.speed
+
+    @property
+    def over(self) -> bool:
+        """Every key was pressed."""
+        return not self._keys
+
+    @property
+    def patience(self) -> float:
+        """s until the next key is due, or a while if only requests move the ride on."""
+        if self._settings.pace == "request" or self._began is None:
+            return 1.0
+        return max(0.0, (self._keys[0][0] - self.time) / self._settings.speed)
+
+    def press_keys(self) -> None:
+        """Print the keys that are due."""
+        while self._keys and self._keys[0][0] <= self.time:
+            _, keys = self._keys.pop(0)
+            try:
+                os.write(sys.stdout.fileno(), f"{keys}\n".encode())
+            except BrokenPipeError:
+                say("nobody reads the operator's keys any more")
+
+    def answer(self) -> bytes:
+        """What the device says to one request: a frame, or a fault."""
+        self._began = time.monotonic() if self._began is None else self._began
+        self.requests += 1
+        raw = self._plan.readings(np.array([self.time]), self._generator)
+        turns, small = (int(t) for t in raw.ticks[0])
+        acceleration, magnetic = (_vector(v[0]) for v in (raw.acceleration, raw.magnetic))
+        return self._spoil(encode(self._layout, Frame((turns, small), acceleration, magnetic)))
+
+    def _spoil(self, frame: bytes) -> bytes:
+        fault = self._next_fault()
+        noise = self._chance.randbytes(len(frame))
+        said = {
+            "short": frame[: len(frame) // 2],
+            "garbage": noise,
+            "silent": b"",
+            "surplus": frame + noise[:5],
+            "duplicate": frame + frame,
+        }.get(fault, frame)
+        if fault == "late":
+            time.sleep(LATE_BY)
+        if self._settings.log and said.startswith(frame):
+            with self._settings.log.open("a") as log:
+                log.write(f"{frame.hex()}\n")
+        return said
+
+    def _next_fault(self) -> str:
+        dice = self._chance.random()
+        for name, probability in self._settings.faults:
+            if dice < probability:
+                return name
+            dice -= probability
+        return ""
+
+
+def operator_keys(plan: ScanPlan) -> Iterator[tuple[float, str]]:
+    """What the operator types, and when (s since the ride began)."""
+    curves = iter(plan.curves)
+    for press in plan.keys:
+        match press.key:
+            case "boundary":
+                yield press.time, "-"
+            case "interior":
+                yield press.time, "+"
+            case "node":
+                yield press.time, str(press.node)
+            case "end":
+                yield press.time, "*" if next(curves).closed else "."
+    yield plan.duration + 0.5, "q"
+
+
+def _plan(settings: VirtualSettings) -> ScanPlan:
+    if settings.shape not in SHAPES:
+        raise BridgeError(f"wanted one of the shapes {', '.join(sorted(SHAPES))}, got {settings.shape!r}")
+    return plan_scan(SHAPES[settings.shape](), Handling(), Imperfections().scaled(settings.noise), settings.seed)
+
+
+def _vector(counts: np.ndarray[tuple[int], np.dtype[np.int64]]) -> tuple[float, float, float]:
+    x, y, z = (float(c) / (COUNTS + 1) for c in counts)
+    return (x, y, z)
