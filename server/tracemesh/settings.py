@@ -1,0 +1,65 @@
+"""Settings of the service: one frozen object, read from `TRACEMESH_...` variables; listed in docs/settings.md."""
+
+from pathlib import Path
+from typing import Self
+
+from platformdirs import user_data_path
+from pydantic import Field, SecretStr, field_validator, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
+"""Hosts that only this machine reaches."""
+MIN_TOKEN = 16
+"""Fewest characters of a token: shorter ones can be guessed."""
+
+
+class Settings(BaseSettings):
+    """How one server runs. Closed by default: any address but loopback demands a token."""
+
+    model_config = SettingsConfigDict(env_prefix="TRACEMESH_", frozen=True, extra="forbid")
+
+    host: str = Field(default="127.0.0.1", description="address to listen on")
+    port: int = Field(default=8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
+    data_dir: Path = Field(
+        default_factory=lambda: user_data_path("tracemesh"), description="folder of the database and the artifacts"
+    )
+    database_url: str = Field(
+        default="",
+        description="postgresql://user:password@host/name; empty: SQLite in the data folder",
+    )
+    token: SecretStr | None = Field(
+        default=None, description=f"secret that every request must bring, {MIN_TOKEN} characters or more"
+    )
+    job_slots: int = Field(default=1, ge=1, le=64, description="reconstructions at once, each in a process of its own")
+    max_devices: int = Field(default=1000, ge=1, description="devices connected at once")
+    max_session_bytes: int = Field(default=2**31, ge=1, description="most bytes of messages in one session")
+    max_upload_bytes: int = Field(default=2**28, ge=1, description="most bytes of an uploaded file")
+
+    @field_validator("token")
+    @classmethod
+    def _long_enough(cls, token: SecretStr | None) -> SecretStr | None:
+        if token is not None and len(token.get_secret_value()) < MIN_TOKEN:
+            raise ValueError(f"wanted a token of {MIN_TOKEN} characters or more, got {len(token.get_secret_value())}")
+        return token
+
+    @model_validator(mode="after")
+    def _closed_off_loopback(self) -> Self:
+        if self.host not in LOOPBACK and self.token is None:
+            raise ValueError(
+                f"{self.host} can be reached from other machines: "
+                "set TRACEMESH_TOKEN to a secret, or listen on 127.0.0.1"
+            )
+        return self
+
+    @property
+    def resolved_database_url(self) -> str:
+        """SQLAlchemy's URL of the database, driver included."""
+        if not self.database_url:
+            return f"sqlite:///{self.data_dir / 'tracemesh.db'}"
+        scheme, separator, rest = self.database_url.partition("://")
+        return f"postgresql+pg8000{separator}{rest}" if scheme in ("postgres", "postgresql") else self.database_url
+
+    @property
+    def artifact_dir(self) -> Path:
+        """Folder of the content-addressed artifacts."""
+        return self.data_dir / "artifacts"

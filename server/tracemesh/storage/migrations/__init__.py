@@ -1,0 +1,1 @@
+"""Schema migrations, run at start; a released one is never edited."""

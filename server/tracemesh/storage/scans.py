@@ -1,0 +1,54 @@
+"""The scan that a session amounts to: samples as sent, everything else as edited."""
+
+from collections import defaultdict
+
+from sqlalchemy.orm import Session as Transaction
+
+from tracemesh.errors import ScanError
+from tracemesh.formats.recordings import Recording, scan_from_recordings
+from tracemesh.geometry.scan import Scan
+from tracemesh.storage.curves import curve_rows, marks_of
+from tracemesh.storage.models import CurveRow, RecordingRow
+from tracemesh.storage.recordings import recording_messages
+from tracemesh.storage.sessions import session_row
+from tracemesh.wire.device import CurveEnd, CurveStart, Hello, NodeMark, Recorded, Samples, from_device
+
+Blocks = dict[int, list[Samples]]
+"""Sample blocks of a recording by the number of their curve."""
+
+
+def load_scan(transaction: Transaction, session: str) -> tuple[Scan, list[int]]:
+    """Everything scanned in a session and, for each curve of the scan, its index in the session.
+
+    Raises NotFound, and ScanError when there is nothing to reconstruct or a curve cannot be understood.
+    """
+    session_row(transaction, session)
+    rows = [row for row in curve_rows(transaction, session) if row.samples]
+    if not rows:
+        raise ScanError(f"session {session} has no curve with samples")
+    blocks = {key: sample_blocks(transaction, key) for key in {row.recording_key for row in rows}}
+    recordings = [_edited(transaction, row, blocks[row.recording_key][row.number]) for row in rows]
+    return scan_from_recordings(recordings), [row.index for row in rows]
+
+
+def sample_blocks(transaction: Transaction, key: int) -> Blocks:
+    """Sample blocks of a recording, in order."""
+    found: Blocks = defaultdict(list)
+    for payload in recording_messages(transaction, key):
+        message = from_device.validate_json(payload)
+        if isinstance(message, Samples):
+            found[message.curve].append(message)
+    return found
+
+
+def _edited(transaction: Transaction, row: CurveRow, blocks: list[Samples]) -> Recording:
+    """A recording of one curve alone."""
+    recording = transaction.get_one(RecordingRow, row.recording_key)
+    messages: list[Recorded] = [
+        CurveStart(seq=0, curve=0, boundary=row.boundary),
+        *blocks,
+        *(NodeMark(seq=0, curve=0, sample=m.sample, node=m.node) for m in marks_of(transaction, row)),
+        CurveEnd(seq=0, curve=0, closed=row.closed),
+    ]
+    numbered = [message.model_copy(update={"seq": seq, "curve": 0}) for seq, message in enumerate(messages)]
+    return Recording(Hello.model_validate_json(recording.hello), numbered)

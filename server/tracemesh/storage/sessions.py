@@ -1,0 +1,83 @@
+"""Sessions: the objects being scanned."""
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session as Transaction
+
+from tracemesh.errors import Conflict, NotFound
+from tracemesh.storage.models import CurveRow, MarkRow, ReconstructionRow, SessionRow, new_id
+from tracemesh.wire.resources import Session, SessionCreate, SessionUpdate
+
+
+def create_session(transaction: Transaction, wanted: SessionCreate) -> Session:
+    """A new session; raises Conflict when its identifier is taken."""
+    identifier = wanted.id or new_id()
+    if transaction.get(SessionRow, identifier) is not None:
+        raise Conflict(f"there is a session {identifier} already")
+    row = SessionRow(id=identifier, name=wanted.name)
+    transaction.add(row)
+    transaction.flush()
+    return _session(transaction, row)
+
+
+def list_sessions(transaction: Transaction, limit: int, after: str | None = None) -> list[Session]:
+    """Newest first; `after` is the last session of the page before. Raises NotFound for an unknown one."""
+    query = select(SessionRow).order_by(SessionRow.created.desc(), SessionRow.id.desc()).limit(limit)
+    if after is not None:
+        last = session_row(transaction, after)
+        same_time = (SessionRow.created == last.created) & (SessionRow.id < last.id)
+        query = query.where((SessionRow.created < last.created) | same_time)
+    return [_session(transaction, row) for row in transaction.scalars(query)]
+
+
+def get_session(transaction: Transaction, identifier: str) -> Session:
+    """One session; raises NotFound."""
+    return _session(transaction, session_row(transaction, identifier))
+
+
+def update_session(transaction: Transaction, identifier: str, change: SessionUpdate) -> Session:
+    """Change what the update names; raises NotFound."""
+    row = session_row(transaction, identifier)
+    if change.name is not None:
+        row.name = change.name
+    return _session(transaction, row)
+
+
+def delete_session(transaction: Transaction, identifier: str) -> None:
+    """Delete a session with everything in it; raises NotFound."""
+    session_row(transaction, identifier)
+    transaction.execute(delete(SessionRow).where(SessionRow.id == identifier))
+
+
+def session_row(transaction: Transaction, identifier: str) -> SessionRow:
+    """Row of a session; raises NotFound."""
+    row = transaction.get(SessionRow, identifier)
+    if row is None:
+        raise NotFound(f"there is no session {identifier}")
+    return row
+
+
+def _session(transaction: Transaction, row: SessionRow) -> Session:
+    kept = (CurveRow.session_id == row.id) & ~CurveRow.removed
+    curves, samples = transaction.execute(
+        select(func.count(), func.coalesce(func.sum(CurveRow.samples), 0)).where(kept)
+    ).one()
+    same_curve = (MarkRow.recording_key == CurveRow.recording_key) & (MarkRow.number == CurveRow.number)
+    nodes = transaction.scalar(
+        select(func.count(MarkRow.node.distinct())).join_from(MarkRow, CurveRow, same_curve).where(kept)
+    )
+    return Session(
+        id=row.id,
+        name=row.name,
+        created=row.created,
+        curves=curves,
+        samples=int(samples),
+        nodes=nodes or 0,
+        latest_reconstruction=_latest_reconstruction(transaction, row.id),
+    )
+
+
+def _latest_reconstruction(transaction: Transaction, identifier: str) -> str | None:
+    done = (ReconstructionRow.session_id == identifier) & (ReconstructionRow.state == "done")
+    return transaction.scalar(
+        select(ReconstructionRow.id).where(done).order_by(ReconstructionRow.created.desc()).limit(1)
+    )
