@@ -1,0 +1,83 @@
+"""The network of a scan under way: whatever hangs together of it, solved over all of its curves at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracemesh.errors import ScanError
+from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.reconstruction import reconstruct_network
+from tracemesh.geometry.scan import CurveScan, Floats, Scan
+from tracemesh.storage.curves import curve_rows
+from tracemesh.storage.database import Database
+from tracemesh.storage.scans import load_scan
+
+
+@dataclass(frozen=True)
+class SolvedCurve:
+    """positions: (n, 3) m, world, from the curve's beginning to its sample `last_sample`."""
+
+    positions: Floats
+    last_sample: int
+
+
+@dataclass(frozen=True)
+class SolvedNetwork:
+    """Curves by their index in the session, nodes (3,) m by their number."""
+
+    curves: dict[int, SolvedCurve]
+    nodes: dict[int, Floats]
+
+
+def solve_attached(database_url: str, session: str) -> SolvedNetwork | None:
+    """The largest part of a session's curves that hangs together by nodes; None while there is nothing to solve."""
+    database = Database(database_url)
+    try:
+        with database.read() as transaction:
+            scan, indices = load_scan(transaction, session)
+            ended = {row.index for row in curve_rows(transaction, session) if row.ended}
+        ready = [i for i, c in enumerate(scan.curves) if len(c.node_samples) > 1 or indices[i] in ended]
+        chosen = largest_piece(scan.curves, ready)
+        return _solve(Scan(tuple(scan.curves[i] for i in chosen)), [indices[i] for i in chosen]) if chosen else None
+    except ScanError:
+        return None
+    finally:
+        database.close()
+
+
+def largest_piece(curves: Sequence[CurveScan], candidates: Sequence[int]) -> list[int]:
+    """Those of the candidates that hang together by shared nodes; the most samples win, then the earliest curve."""
+    pieces: list[tuple[set[int], list[int]]] = []
+    for i in candidates:
+        nodes = set(curves[i].node_ids.tolist())
+        joined = [piece for piece in pieces if piece[0] & nodes]
+        pieces = [piece for piece in pieces if not piece[0] & nodes]
+        pieces.append((nodes.union(*(p[0] for p in joined)), sorted([i, *(j for p in joined for j in p[1])])))
+    members = [piece[1] for piece in pieces]
+    return max(members, key=lambda piece: (sum(len(curves[i].distance) for i in piece), -piece[0]), default=[])
+
+
+def _solve(scan: Scan, indices: Sequence[int]) -> SolvedNetwork | None:
+    network = reconstruct_network(scan).network
+    numbers = np.unique(np.concatenate([curve.node_ids for curve in scan.curves]))
+    if len(network.nodes) < len(numbers):
+        return None
+    curves = {
+        index: SolvedCurve(_along(network, i), _last_sample(curve))
+        for i, (index, curve) in enumerate(zip(indices, scan.curves, strict=True))
+    }
+    return SolvedNetwork(curves, {int(n): network.points[p] for n, p in zip(numbers, network.nodes, strict=False)})
+
+
+def _along(network: CurveNetwork, curve: int) -> Floats:
+    """Points (n, 3) of one curve from its beginning to its end."""
+    segments = [segment.points for segment in network.segments if segment.curve == curve]
+    positions: Floats = network.points[np.concatenate([segments[0], *(points[1:] for points in segments[1:])])]
+    return positions
+
+
+def _last_sample(curve: CurveScan) -> int:
+    """The last sample that the network holds: an open curve is cut at its last node, if it has two."""
+    whole = curve.closed or len(curve.node_samples) < 2
+    return len(curve.distance) - 1 if whole else int(curve.node_samples[-1])

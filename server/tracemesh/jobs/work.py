@@ -1,0 +1,63 @@
+"""One attempt at a reconstruction, in whatever process it runs: reads its scan, writes its progress and its results."""
+
+from pathlib import Path
+
+from tracemesh.errors import Cancelled, TracemeshError
+from tracemesh.pipeline import Reconstruction, reconstruct
+from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.storage.database import Database
+from tracemesh.storage.models import ReconstructionRow
+from tracemesh.storage.reconstructions import finish, report_progress
+from tracemesh.storage.scans import load_scan
+from tracemesh.wire.resources import JobState, ReconstructionParameters
+
+
+def work(database_url: str, artifact_dir: Path, identifier: str, attempt: int) -> None:
+    """Run an attempt to its end, whatever that is; the row tells."""
+    database = Database(database_url)
+    try:
+        _Attempt(database, ArtifactStore(artifact_dir), identifier, attempt).run()
+    finally:
+        database.close()
+
+
+class _Attempt:
+    def __init__(self, database: Database, store: ArtifactStore, identifier: str, attempt: int) -> None:
+        self._database = database
+        self._store = store
+        self._identifier = identifier
+        self._attempt = attempt
+
+    def run(self) -> None:
+        try:
+            self._reconstruct()
+        except Cancelled:
+            self._end("cancelled")
+        except TracemeshError as error:
+            self._end("failed", str(error))
+        except MemoryError:
+            self._end("failed", "it needs more memory than there is")
+
+    def _reconstruct(self) -> None:
+        with self._database.read() as transaction:
+            row = transaction.get_one(ReconstructionRow, self._identifier)
+            parameters = ReconstructionParameters.model_validate(row.parameters)
+            scan, _ = load_scan(transaction, row.session_id)
+        result = reconstruct(scan, parameters, self._progress)
+        artifacts = {name: (self._store.put(content), len(content)) for name, content in _files(result).items()}
+        with self._database.write() as transaction:
+            finish(transaction, self._identifier, self._attempt, "done", artifacts=artifacts)
+
+    def _progress(self, stage: str, fraction: float) -> None:
+        with self._database.write() as transaction:
+            if not report_progress(transaction, self._identifier, self._attempt, stage, fraction):
+                raise Cancelled(f"reconstruction {self._identifier} was asked to stop")
+
+    def _end(self, state: JobState, error: str | None = None) -> None:
+        with self._database.write() as transaction:
+            finish(transaction, self._identifier, self._attempt, state, error)
+
+
+def _files(result: Reconstruction) -> dict[str, bytes]:
+    files = {"network.json": result.network_file(), "report.json": result.report_file()}
+    return files if result.mesh is None else {**files, "mesh.glb": result.mesh_file()}
