@@ -1,0 +1,80 @@
+"""The application: nothing global, everything from its settings."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+from typing import Any
+
+from fastapi import APIRouter, FastAPI
+from starlette.middleware import Middleware
+
+from tracemesh.api.access import Access
+from tracemesh.api.errors import install_handlers
+from tracemesh.api.live.hub import Hub
+from tracemesh.api.recorder import Recorder
+from tracemesh.api.routes import curves, ingest, live, pages, reconstructions, recordings, sessions
+from tracemesh.api.services import Services
+from tracemesh.jobs.runner import JobRunner
+from tracemesh.settings import Settings
+from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.storage.database import Database
+from tracemesh.storage.states import RecordingState
+from tracemesh.wire.device import Recorded
+from tracemesh.wire.resources import Problem, Reconstruction
+
+log = logging.getLogger(__name__)
+PROBLEMS: dict[int | str, dict[str, Any]] = {status: {"model": Problem} for status in (401, 403, 404, 409, 422)}
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The service with these settings; opens its database when it starts, commits and closes when it stops."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        async with running(settings) as services:
+            app.state.services = services
+            yield
+
+    app = FastAPI(
+        title="tracemesh",
+        version=version("tracemesh"),
+        description="Curve networks and surfaces from orientations measured along curves.",
+        lifespan=lifespan,
+        middleware=[Middleware(Access, settings=settings)],
+    )
+    install_handlers(app)
+    api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
+    for module in (sessions, curves, recordings, reconstructions, ingest, live):
+        api.include_router(module.router)
+    app.include_router(api)
+    app.include_router(pages.router)
+    pages.mount_web(app)
+    return app
+
+
+@asynccontextmanager
+async def running(settings: Settings) -> AsyncIterator[Services]:
+    """The services while the application runs."""
+    loop = asyncio.get_running_loop()
+    database = Database(settings.resolved_database_url)
+    await asyncio.to_thread(database.migrate)
+
+    def observe(state: RecordingState, message: Recorded) -> None:
+        hub.accepted(state, message)
+
+    def tell(reconstruction: Reconstruction) -> None:
+        loop.call_soon_threadsafe(hub.progressed, reconstruction)
+
+    recorder = Recorder(database, settings.max_session_bytes, observe)
+    hub = Hub(database, settings.resolved_database_url, recorder.flush)
+    runner = JobRunner(settings, database, tell)
+    store = ArtifactStore(settings.artifact_dir)
+    try:
+        yield Services(settings, database, store, recorder, hub, runner, loop)
+    finally:
+        await asyncio.to_thread(runner.close)
+        await hub.close()
+        await recorder.close()
+        database.close()

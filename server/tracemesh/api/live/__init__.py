@@ -1,0 +1,1 @@
+"""What browsers watch: drawn from accepted messages, apart from what is recorded; may drop, never delay."""

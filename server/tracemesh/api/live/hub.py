@@ -1,0 +1,108 @@
+"""All rooms and all devices; the only place where what is recorded meets what is watched."""
+
+import asyncio
+from collections import defaultdict
+from collections.abc import Awaitable, Callable
+from concurrent.futures.process import BrokenProcessPool
+
+from tracemesh.api.live.client import Client
+from tracemesh.api.live.meter import Meter
+from tracemesh.api.live.room import Room
+from tracemesh.api.live.tracker import Accepted, SessionTracker
+from tracemesh.jobs.attached import SolvedNetwork, solve_attached
+from tracemesh.jobs.slot import Slot
+from tracemesh.storage.database import Database
+from tracemesh.storage.reconstructions import list_reconstructions
+from tracemesh.storage.states import RecordingState
+from tracemesh.wire.device import Recorded, Samples
+from tracemesh.wire.resources import Reconstruction
+
+
+class Hub:
+    """To be used on one event loop."""
+
+    def __init__(self, database: Database, database_url: str, flush: Callable[[], Awaitable[None]]) -> None:
+        """`flush` waits until everything accepted is committed."""
+        self._database = database
+        self._database_url = database_url
+        self._flush = flush
+        self._rooms: dict[str, Room] = {}
+        self._meters: dict[str, dict[int, Meter]] = defaultdict(dict)
+        self._slot = Slot()
+        self._one_at_a_time = asyncio.Lock()
+
+    async def close(self) -> None:
+        """Send everybody away."""
+        for room in self._rooms.values():
+            for client in room.clients:
+                client.end()
+            await room.close()
+        await asyncio.to_thread(self._slot.close)
+
+    def connected(self, state: RecordingState) -> None:
+        """A device begins to send."""
+        self._meters[state.session.id][state.key] = Meter(state.hello)
+
+    def disconnected(self, state: RecordingState) -> None:
+        """A device is gone; watchers see it as lost until nobody watches."""
+        self._meters[state.session.id][state.key].connected = False
+        if state.session.id not in self._rooms:
+            self._forget_lost(state.session.id)
+
+    def accepted(self, state: RecordingState, message: Recorded) -> None:
+        """Show a message that the recorder took; costs next to nothing while nobody watches."""
+        meter = self._meters.get(state.session.id, {}).get(state.key)
+        if meter is not None and isinstance(message, Samples):
+            meter.add(message)
+        room = self._rooms.get(state.session.id)
+        if room is not None:
+            room.take(Accepted(state.key, state.hello.device, state.curves[message.curve].index, message))
+
+    def edited(self, session: str) -> None:
+        """Curves or marks of a session were edited."""
+        if session in self._rooms:
+            self._rooms[session].reload()
+
+    def progressed(self, reconstruction: Reconstruction) -> None:
+        """A reconstruction changed."""
+        if reconstruction.session in self._rooms:
+            self._rooms[reconstruction.session].tell(reconstruction)
+
+    def join(self, session: str) -> tuple[Room, Client]:
+        """Somebody watches."""
+        if session not in self._rooms:
+            self._rooms[session] = Room(session, self._meters[session], self._load, self._solve)
+        room, client = self._rooms[session], Client()
+        room.clients.add(client)
+        return room, client
+
+    async def leave(self, room: Room, client: Client) -> None:
+        """Somebody watches no more; the last one puts out the light."""
+        room.clients.discard(client)
+        if not room.clients and self._rooms.get(room.session) is room:
+            del self._rooms[room.session]
+            self._forget_lost(room.session)
+            await room.close()
+
+    def _forget_lost(self, session: str) -> None:
+        kept = {key: meter for key, meter in self._meters.pop(session, {}).items() if meter.connected}
+        if kept:
+            self._meters[session] = kept
+
+    async def _load(self, session: str) -> tuple[SessionTracker, Reconstruction | None]:
+        def read() -> tuple[SessionTracker, Reconstruction | None]:
+            with self._database.read() as transaction:
+                tracker = SessionTracker.load(transaction, session)
+                return tracker, next(iter(list_reconstructions(transaction, session)), None)
+
+        return await asyncio.to_thread(read)
+
+    async def _solve(self, session: str) -> SolvedNetwork | None:
+        """In another process, one network at a time: drawing and recording go on meanwhile."""
+        async with self._one_at_a_time:
+            await self._flush()
+            try:
+                return await asyncio.wrap_future(self._slot.submit(solve_attached, self._database_url, session))
+            except BrokenProcessPool:
+                self._slot.renew()
+                return None

@@ -1,0 +1,70 @@
+"""Health of a device that records: rate, age, strength and dip of what it measures."""
+
+from collections import deque
+from time import monotonic
+
+import numpy as np
+
+from tracemesh.geometry.orientation import angles_between
+from tracemesh.geometry.scan import Floats
+from tracemesh.wire.device import Hello, Samples
+from tracemesh.wire.live import LiveDevice
+
+STALE_AFTER = 2.0
+"""s without a sample."""
+WINDOW = 1.0
+"""s over which the rate is measured."""
+
+
+class Meter:
+    """Counts samples as they arrive; reads their values only when asked."""
+
+    def __init__(self, hello: Hello) -> None:
+        """Nothing arrived yet."""
+        self._hello = hello
+        self._began = self._last = monotonic()
+        self._arrivals: deque[tuple[float, int]] = deque(maxlen=1000)
+        self._block: Samples | None = None
+        self.connected = True
+
+    def add(self, block: Samples) -> None:
+        """A block arrived now."""
+        self._last = monotonic()
+        self._arrivals.append((self._last, block.count))
+        self._block = block
+
+    def read(self) -> LiveDevice:
+        """Health now."""
+        now = monotonic()
+        age = now - self._last
+        recent = sum(count for time, count in self._arrivals if time > now - WINDOW)
+        acceleration, magnetic = self._vectors()
+        return LiveDevice(
+            recording=self._hello.recording,
+            kind=self._hello.device.kind,
+            name=self._hello.device.name,
+            state="lost" if not self.connected else "stale" if age > STALE_AFTER else "live",
+            rate=recent / min(WINDOW, max(now - self._began, 0.1)),
+            age=age,
+            acceleration_norm=_mean_norm(acceleration),
+            magnetic_norm=_mean_norm(magnetic),
+            dip=_dip(acceleration, magnetic),
+        )
+
+    def _vectors(self) -> tuple[Floats | None, Floats | None]:
+        if self._block is None:
+            return None, None
+        columns = self._block.acceleration, self._block.magnetic
+        acceleration, magnetic = (None if column is None else np.array(column, float) for column in columns)
+        return acceleration, magnetic
+
+
+def _mean_norm(vectors: Floats | None) -> float | None:
+    return None if vectors is None else float(np.mean(np.linalg.norm(vectors, axis=1)))
+
+
+def _dip(acceleration: Floats | None, magnetic: Floats | None) -> float | None:
+    """Angle of the field below the horizontal; acceleration points up at rest."""
+    if acceleration is None or magnetic is None:
+        return None
+    return float(np.mean(angles_between(acceleration, magnetic))) - np.pi / 2

@@ -1,0 +1,135 @@
+"""Everybody who watches one session: messages in, changes drawn at frame rate, the same text to every browser."""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+
+from pydantic import BaseModel
+
+from tracemesh.api.live.client import Client
+from tracemesh.api.live.meter import Meter
+from tracemesh.api.live.tracker import Accepted, SessionTracker
+from tracemesh.jobs.attached import SolvedNetwork
+from tracemesh.wire.device import CurveEnd, NodeMark
+from tracemesh.wire.live import LiveReconstruction, Snapshot
+from tracemesh.wire.resources import Reconstruction
+
+FRAME = 1 / 60
+"""s between two updates of what is drawn."""
+HEALTH_INTERVAL = 0.5
+"""s between two readings of the devices' health."""
+MAX_PENDING = 20_000
+"""Messages that wait to be drawn, before the session is rather read again from the database."""
+log = logging.getLogger(__name__)
+
+
+class Room:
+    """Lives while somebody watches."""
+
+    def __init__(
+        self,
+        session: str,
+        meters: dict[int, Meter],
+        load: Callable[[str], Awaitable[tuple[SessionTracker, Reconstruction | None]]],
+        solve: Callable[[str], Awaitable[SolvedNetwork | None]],
+    ) -> None:
+        """`meters`: of the session's devices, kept by the caller; `load` and `solve` read what is committed."""
+        self.session = session
+        self.clients: set[Client] = set()
+        self._meters = meters
+        self._load = load
+        self._solve = solve
+        self._tracker = SessionTracker()
+        self._reconstruction: Reconstruction | None = None
+        self._pending: list[Accepted] = []
+        self._stale = True
+        self._changed = asyncio.Event()
+        self._unsolved = asyncio.Event()
+        self._loaded = asyncio.Event()
+        self._tasks = [asyncio.create_task(self._guard(work)) for work in (self._draw, self._settle, self._tell_health)]
+
+    async def close(self) -> None:
+        """Nobody watches any more."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def take(self, accepted: Accepted) -> None:
+        """A message was accepted; drawn at the next frame."""
+        self._pending.append(accepted)
+        if len(self._pending) > MAX_PENDING:
+            self.reload()
+        self._changed.set()
+
+    def reload(self) -> None:
+        """What is stored was edited: read it again."""
+        self._pending.clear()
+        self._stale = True
+        self._changed.set()
+
+    def tell(self, reconstruction: Reconstruction) -> None:
+        """A reconstruction made progress."""
+        self._reconstruction = reconstruction
+        self._broadcast(LiveReconstruction(reconstruction=reconstruction))
+
+    async def snapshot(self) -> str:
+        """Everything a late joiner needs."""
+        await self._loaded.wait()
+        network = self._tracker.network()
+        return Snapshot(
+            session=self.session,
+            curves=network.curves,
+            nodes=network.nodes,
+            devices=[meter.read() for meter in self._meters.values()],
+            reconstruction=self._reconstruction,
+        ).model_dump_json()
+
+    def _broadcast(self, message: BaseModel) -> None:
+        text = message.model_dump_json()
+        for client in self.clients:
+            client.push(text)
+
+    async def _draw(self) -> None:
+        while True:
+            if self._stale:
+                await self._read_again()
+            await self._changed.wait()
+            self._changed.clear()
+            accepted, self._pending = self._pending, []
+            for change in self._tracker.take(accepted):
+                self._broadcast(change)
+            if any(isinstance(a.message, NodeMark | CurveEnd) for a in accepted):
+                self._unsolved.set()
+            await asyncio.sleep(FRAME)
+
+    async def _read_again(self) -> None:
+        self._stale = False
+        self._tracker, self._reconstruction = await self._load(self.session)
+        self._loaded.set()
+        self._unsolved.set()
+        for client in self.clients:
+            client.need_snapshot()
+
+    async def _settle(self) -> None:
+        """One solution at a time; marks that come meanwhile make one more."""
+        while True:
+            await self._unsolved.wait()
+            self._unsolved.clear()
+            tracker = self._tracker
+            solved = await self._solve(self.session)
+            if solved is not None and tracker is self._tracker and not self._stale:
+                self._broadcast(tracker.settle(solved))
+
+    async def _tell_health(self) -> None:
+        while True:
+            for meter in self._meters.values():
+                self._broadcast(meter.read())
+            await asyncio.sleep(HEALTH_INTERVAL)
+
+    async def _guard(self, work: Callable[[], Awaitable[None]]) -> None:
+        try:
+            await work()
+        except Exception:
+            log.exception("live view of session %s stopped", self.session)
+            for client in self.clients:
+                client.end()

@@ -1,0 +1,172 @@
+"""The recorder: takes messages on the event loop, commits them in groups on one writer thread, acknowledges them after.
+
+While one group is being committed the next one gathers, so more devices do not mean more commits.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
+
+from tracemesh.errors import Refused
+from tracemesh.storage.database import Database
+from tracemesh.storage.ingest import Group, commit, open_recording
+from tracemesh.storage.sessions import delete_session
+from tracemesh.storage.states import RecordingState, SessionState
+from tracemesh.wire.device import Hello, Recorded
+
+log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+
+class Sender(Protocol):
+    """Whoever sends a recording: a device's connection or an upload."""
+
+    def acknowledge(self, seq: int) -> None:
+        """Everything up to and including `seq` is durable."""
+
+    def fail(self, reason: Refused) -> None:
+        """Nothing more is taken from this sender."""
+
+
+@dataclass(frozen=True)
+class _Batch:
+    group: Group = field(default_factory=Group)
+    done: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+class Recorder:
+    """Every write of recordings goes through here; to be used on one event loop."""
+
+    def __init__(
+        self, database: Database, max_session_bytes: int, observer: Callable[[RecordingState, Recorded], None]
+    ) -> None:
+        """`observer` sees every message once, as soon as it is accepted; it must not wait."""
+        self._database = database
+        self._max_session_bytes = max_session_bytes
+        self._observer = observer
+        self._open: dict[int, tuple[RecordingState, Sender]] = {}
+        self._deleting: set[str] = set()
+        self._batch = _Batch()
+        self._wake = asyncio.Event()
+        self._lock = asyncio.Lock()
+        self._closing = False
+        self._writer = ThreadPoolExecutor(1, "recorder")
+        self._task = asyncio.create_task(self._run())
+
+    async def close(self) -> None:
+        """Commit what was accepted, then stop."""
+        self._closing = True
+        self._wake.set()
+        await self._task
+        self._writer.shutdown()
+
+    @property
+    def open_count(self) -> int:
+        """Recordings that somebody sends now."""
+        return len(self._open)
+
+    async def open(self, hello: Hello, payload: bytes, sender: Sender) -> RecordingState:
+        """Begin or go on with a recording; another sender of the same one is cut off. Raises Refused."""
+        async with self._lock:
+            state = await self._write(open_recording, hello, payload)
+            if state.session.id in self._deleting:
+                raise Refused("unknown", f"there is no session {state.session.id}")
+            if state.key in self._open:
+                state, before = self._open[state.key]
+                before.fail(Refused("limit", "the recording goes on over another connection"))
+            else:
+                state.session = self._shared(state.session)
+            self._open[state.key] = state, sender
+            await self.flush()
+            return state
+
+    async def leave(self, state: RecordingState, sender: Sender) -> None:
+        """The sender is gone; what it sent is committed first."""
+        async with self._lock:
+            await self.flush()
+            if state.key in self._open and self._open[state.key][1] is sender:
+                del self._open[state.key]
+
+    def accept(self, state: RecordingState, message: Recorded, payload: bytes) -> None:
+        """Take a message; one that was sent before is only acknowledged again. Raises Refused."""
+        if state.key not in self._open or self._open[state.key][0] is not state:
+            raise Refused("storage", "the recording is not open any more; connect again")
+        if message.seq < state.next_seq:
+            self._batch.group.acknowledge(state)
+        else:
+            state.check(message)
+            self._check_size(state, len(payload))
+            state.advance(message, len(payload))
+            self._batch.group.add(state, message, payload)
+            self._observer(state, message)
+        self._wake.set()
+
+    async def flush(self) -> None:
+        """Wait until everything accepted so far is durable."""
+        batch = self._batch
+        self._wake.set()
+        await batch.done.wait()
+
+    async def delete_session(self, identifier: str) -> None:
+        """Cut off who records into a session, then delete it. Raises NotFound."""
+        self._deleting.add(identifier)
+        try:
+            for key, (state, sender) in list(self._open.items()):
+                if state.session.id == identifier:
+                    sender.fail(Refused("unknown", f"session {identifier} was deleted"))
+                    del self._open[key]
+            await self.flush()
+            await self._write(delete_session, identifier)
+        finally:
+            self._deleting.discard(identifier)
+
+    def _shared(self, session: SessionState) -> SessionState:
+        """One state for all recordings of a session, so that they do not give two curves one index."""
+        return next((state.session for state, _ in self._open.values() if state.session.id == session.id), session)
+
+    def _check_size(self, state: RecordingState, size: int) -> None:
+        if state.session.bytes + size > self._max_session_bytes:
+            raise Refused("limit", f"session {state.session.id} would exceed {self._max_session_bytes} bytes")
+
+    async def _write(self, work: Callable[..., T], *arguments: object) -> T:
+        """Run `work` in a transaction of its own on the writer thread."""
+
+        def transaction() -> T:
+            with self._database.write() as session:
+                return work(session, *arguments)
+
+        return await asyncio.get_running_loop().run_in_executor(self._writer, transaction)
+
+    async def _run(self) -> None:
+        while not self._closing or self._batch.group.reached:
+            await self._wake.wait()
+            self._wake.clear()
+            batch, self._batch = self._batch, _Batch()
+            if batch.group.reached:
+                await self._commit(batch.group)
+            batch.done.set()
+
+    async def _commit(self, group: Group) -> None:
+        try:
+            await self._write(commit, group)
+        except Exception:
+            log.exception("could not commit %d messages", len(group.messages))
+            self._fail_all()
+            return
+        for key, row in group.reached.items():
+            if key in self._open:
+                state, sender = self._open[key]
+                state.committed = row.next_seq
+                sender.acknowledge(state.committed - 1)
+
+    def _fail_all(self) -> None:
+        """What is in memory runs ahead of what could be stored: everybody has to go back to what is durable."""
+        reason = Refused("storage", "the server cannot store messages now; keep them and connect again")
+        for _, sender in self._open.values():
+            sender.fail(reason)
+        self._open.clear()
+        self._batch.done.set()
+        self._batch = _Batch()

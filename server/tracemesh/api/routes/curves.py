@@ -1,0 +1,34 @@
+"""Curves of a session: as sent, and as edited afterwards."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path
+
+from tracemesh.api.services import Reading, UseServices
+from tracemesh.storage import curves
+from tracemesh.wire.base import Identifier
+from tracemesh.wire.resources import Curve, CurveUpdate
+
+router = APIRouter(prefix="/sessions/{session}/curves", tags=["curves"])
+Index = Annotated[int, Path(ge=0, le=2**31 - 1)]
+
+
+@router.get("")
+def list_all(session: Identifier, transaction: Reading) -> list[Curve]:
+    """In the order of scanning, less those that were removed."""
+    return curves.list_curves(transaction, session)
+
+
+@router.get("/{index}")
+def get(session: Identifier, index: Index, transaction: Reading) -> Curve:
+    """One curve."""
+    return curves.get_curve(transaction, session, index)
+
+
+@router.patch("/{index}")
+def update(session: Identifier, index: Index, change: CurveUpdate, services: UseServices) -> Curve:
+    """Change what the body names; the samples stay as they were sent."""
+    with services.database.write() as transaction:
+        changed = curves.update_curve(transaction, session, index, change)
+    services.loop.call_soon_threadsafe(services.hub.edited, session)
+    return changed

@@ -1,0 +1,129 @@
+"""The socket on which devices send."""
+
+import asyncio
+import logging
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import ValidationError
+
+from tracemesh.api.services import Services, UseServices
+from tracemesh.api.sockets import first_to_end
+from tracemesh.errors import Refused
+from tracemesh.storage.states import RecordingState
+from tracemesh.wire.base import PROTOCOL_VERSION
+from tracemesh.wire.device import Ack, ErrorMessage, Hello, Recorded, Welcome, from_device
+
+MAX_UNACKNOWLEDGED = 512
+"""Messages of one device that wait for the disk before no more are read from it."""
+HELLO_TIMEOUT = 10.0
+"""s in which a device has to say hello."""
+router = APIRouter()
+log = logging.getLogger(__name__)
+
+
+@router.websocket("/ingest")
+async def ingest(socket: WebSocket, services: UseServices) -> None:
+    """The device protocol: see docs/protocol.md."""
+    await socket.accept()
+    device = _Connection(socket, services)
+    try:
+        await device.serve()
+    except Refused as reason:
+        await device.refuse(reason)
+    except (WebSocketDisconnect, TimeoutError):
+        pass
+    finally:
+        await device.leave()
+
+
+class _Connection:
+    """One device's connection; the recorder's view of it is a Sender."""
+
+    def __init__(self, socket: WebSocket, services: Services) -> None:
+        self._socket = socket
+        self._services = services
+        self._state: RecordingState | None = None
+        self._acknowledged = -1
+        self._failure: Refused | None = None
+        self._wake = asyncio.Event()
+
+    def acknowledge(self, seq: int) -> None:
+        self._acknowledged = seq
+        self._wake.set()
+
+    def fail(self, reason: Refused) -> None:
+        self._failure = reason
+        self._wake.set()
+
+    async def serve(self) -> None:
+        """Until either side has had enough."""
+        async with asyncio.timeout(HELLO_TIMEOUT):
+            payload = await self._receive()
+        hello = _parsed(payload)
+        if not isinstance(hello, Hello):
+            raise Refused("malformed", f"wanted hello first, got {hello.type}")
+        if self._services.recorder.open_count >= self._services.settings.max_devices:
+            raise Refused("limit", f"{self._services.settings.max_devices} devices are connected already")
+        self._state = await self._services.recorder.open(hello, payload, self)
+        self._services.hub.connected(self._state)
+        await self._send(
+            Welcome(version=PROTOCOL_VERSION, session=self._state.session.id, next_seq=self._state.next_seq)
+        )
+        log.info("recording %s: %s is here, at message %d", hello.recording, hello.device.kind, self._state.next_seq)
+        await first_to_end(self._read(self._state), self._answer())
+
+    async def refuse(self, reason: Refused) -> None:
+        """Say why, and close."""
+        log.warning("a device was refused: %s: %s", reason.code, reason)
+        message = ErrorMessage(code=reason.code, message=str(reason), expected_seq=reason.expected_seq)
+        try:
+            await self._send(message)
+            await self._socket.close(1008 if reason.code != "storage" else 1013)
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+
+    async def leave(self) -> None:
+        """Give up the recording."""
+        if self._state is not None:
+            self._services.hub.disconnected(self._state)
+            await self._services.recorder.leave(self._state, self)
+
+    async def _read(self, state: RecordingState) -> None:
+        recorder = self._services.recorder
+        while True:
+            payload = await self._receive()
+            message = _parsed(payload)
+            if isinstance(message, Hello):
+                raise Refused("malformed", "wanted one hello, got a second one")
+            recorder.accept(state, message, payload)
+            if state.next_seq - state.committed > MAX_UNACKNOWLEDGED:
+                await recorder.flush()
+
+    async def _answer(self) -> None:
+        while self._failure is None:
+            await self._wake.wait()
+            self._wake.clear()
+            if self._acknowledged >= 0:
+                await self._send(Ack(seq=self._acknowledged))
+        raise self._failure
+
+    async def _receive(self) -> bytes:
+        message = await self._socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1006))
+        text: str | None = message.get("text")
+        payload: bytes = message["bytes"] if text is None else text.encode()
+        return payload
+
+    async def _send(self, message: Welcome | Ack | ErrorMessage) -> None:
+        await self._socket.send_text(message.model_dump_json(exclude_none=True))
+
+
+def _parsed(payload: bytes) -> Hello | Recorded:
+    if b"\n" in payload or b"\r" in payload:
+        raise Refused("malformed", "wanted one message on one line")
+    try:
+        return from_device.validate_json(payload)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise Refused("malformed", f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None

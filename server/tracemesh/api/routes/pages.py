@@ -1,0 +1,29 @@
+"""What is not the API: health, and the web app as built."""
+
+from pathlib import Path
+
+from fastapi import APIRouter, FastAPI
+from fastapi.responses import HTMLResponse, PlainTextResponse
+from starlette.staticfiles import StaticFiles
+
+WEB = Path(__file__).resolve().parents[2] / "web"
+"""Where `make setup` builds the web app."""
+NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>tracemesh</title>
+<body style="font: 16px system-ui; max-width: 36em; margin: 4em auto"><h1>tracemesh</h1>
+<p>The server runs, but its web app is not built: run <code>make setup</code>, then load this page again.</p>
+<p>The API is described at <a href="/docs">/docs</a>.</p></body></html>"""
+router = APIRouter(include_in_schema=False)
+
+
+@router.get("/healthz")
+def healthz() -> PlainTextResponse:
+    """The process answers."""
+    return PlainTextResponse("ok\n")
+
+
+def mount_web(app: FastAPI, folder: Path = WEB) -> None:
+    """Serve the web app, or say how it is built."""
+    if (folder / "index.html").is_file():
+        app.mount("/", StaticFiles(directory=folder, html=True))
+    else:
+        app.add_api_route("/", lambda: HTMLResponse(NOT_BUILT), include_in_schema=False)

@@ -1,0 +1,67 @@
+"""Reconstructions of a session, which are jobs, and the files that they leave."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Header, Response
+from fastapi.responses import FileResponse
+
+from tracemesh.api.services import Reading, UseServices
+from tracemesh.storage import reconstructions
+from tracemesh.storage.artifacts import MEDIA_TYPES, artifact_row
+from tracemesh.wire.base import Identifier
+from tracemesh.wire.resources import Reconstruction, ReconstructionParameters
+
+router = APIRouter(tags=["reconstructions"])
+
+
+@router.post("/sessions/{session}/reconstructions", status_code=202)
+def create(
+    session: Identifier,
+    services: UseServices,
+    response: Response,
+    parameters: ReconstructionParameters | None = None,
+) -> Reconstruction:
+    """Queue a reconstruction; follow it with GET or on the session's live socket."""
+    with services.database.write() as transaction:
+        made = reconstructions.create_reconstruction(transaction, session, parameters or ReconstructionParameters())
+    services.runner.submit(made.id)
+    services.loop.call_soon_threadsafe(services.hub.progressed, made)
+    response.headers["Location"] = f"/api/v1/reconstructions/{made.id}"
+    return made
+
+
+@router.get("/sessions/{session}/reconstructions")
+def list_all(session: Identifier, transaction: Reading) -> list[Reconstruction]:
+    """Newest first."""
+    return reconstructions.list_reconstructions(transaction, session)
+
+
+@router.get("/reconstructions/{reconstruction}")
+def get(reconstruction: Identifier, transaction: Reading) -> Reconstruction:
+    """One reconstruction, with its progress."""
+    return reconstructions.get_reconstruction(transaction, reconstruction)
+
+
+@router.post("/reconstructions/{reconstruction}/cancel", status_code=202)
+def cancel(reconstruction: Identifier, services: UseServices) -> Reconstruction:
+    """Stop it: at once while it is queued, after its present stage when it runs; 409 when it has ended."""
+    with services.database.write() as transaction:
+        stopped = reconstructions.request_cancel(transaction, reconstruction)
+    services.loop.call_soon_threadsafe(services.hub.progressed, stopped)
+    return stopped
+
+
+@router.get("/reconstructions/{reconstruction}/{name}", response_class=FileResponse)
+def artifact(
+    reconstruction: Identifier,
+    name: Literal["network.json", "mesh.glb", "report.json"],
+    transaction: Reading,
+    services: UseServices,
+    if_none_match: Annotated[str, Header()] = "",
+) -> Response:
+    """A file that it left; knows ETag, If-None-Match and Range."""
+    row = artifact_row(transaction, reconstruction, name)
+    headers = {"ETag": f'"{row.sha256}"', "Cache-Control": "private, no-cache"}
+    if f'"{row.sha256}"' in if_none_match or if_none_match.strip() == "*":
+        return Response(status_code=304, headers=headers)
+    return FileResponse(services.artifacts.path(row.sha256), headers=headers, media_type=MEDIA_TYPES[name])

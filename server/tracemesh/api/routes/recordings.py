@@ -1,0 +1,64 @@
+"""Recordings of a session: everything that devices sent, byte for byte, and files that are taken in as if sent."""
+
+from collections.abc import Iterator
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import StreamingResponse
+from starlette.concurrency import run_in_threadpool
+
+from tracemesh.api.services import Reading, Services, UseServices
+from tracemesh.api.upload import parse_upload, store_upload
+from tracemesh.errors import InputError
+from tracemesh.storage import recordings
+from tracemesh.storage.recordings import recording_messages, recording_row
+from tracemesh.wire.base import Identifier
+from tracemesh.wire.resources import RecordingSummary
+
+router = APIRouter(prefix="/sessions/{session}/recordings", tags=["recordings"])
+
+
+@router.get("")
+def list_all(session: Identifier, transaction: Reading) -> list[RecordingSummary]:
+    """In the order in which they began."""
+    return recordings.list_recordings(transaction, session)
+
+
+@router.get("/{recording}", response_class=StreamingResponse)
+def export(session: Identifier, recording: Identifier, services: UseServices) -> StreamingResponse:
+    """Newline-delimited JSON: `hello` and the numbered messages exactly as they were sent."""
+    with services.database.read() as transaction:
+        row = recording_row(transaction, session, recording)
+    headers = {"Content-Disposition": f'attachment; filename="{recording}.ndjson"'}
+    return StreamingResponse(_lines(services, row.key, row.hello), headers=headers, media_type="application/x-ndjson")
+
+
+@router.post("", status_code=201)
+async def upload(session: Identifier, request: Request, services: UseServices, response: Response) -> RecordingSummary:
+    """Take in a rawnet or a recording, told apart by their first character; a recording sent before is completed."""
+    content = await _body(request, services.settings.max_upload_bytes)
+    parsed = await run_in_threadpool(parse_upload, content, session)
+    await store_upload(services.recorder, parsed)
+    services.hub.edited(session)
+    response.headers["Location"] = f"/api/v1/sessions/{session}/recordings/{parsed.hello.recording}"
+    return await run_in_threadpool(_summary, services, session, parsed.hello.recording)
+
+
+async def _body(request: Request, limit: int) -> bytes:
+    content = bytearray()
+    async for chunk in request.stream():
+        content += chunk
+        if len(content) > limit:
+            raise InputError(f"wanted a file of at most {limit} bytes")
+    return bytes(content)
+
+
+def _summary(services: Services, session: str, recording: str) -> RecordingSummary:
+    with services.database.read() as transaction:
+        return recordings.summary(recording_row(transaction, session, recording))
+
+
+def _lines(services: Services, key: int, hello: bytes) -> Iterator[bytes]:
+    yield hello + b"\n"
+    with services.database.read() as transaction:
+        for payload in recording_messages(transaction, key):
+            yield payload + b"\n"

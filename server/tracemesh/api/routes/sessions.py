@@ -1,0 +1,53 @@
+"""Sessions: the objects being scanned."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from tracemesh.api.services import Reading, UseServices, Writing
+from tracemesh.storage import sessions
+from tracemesh.wire.base import Identifier
+from tracemesh.wire.resources import Session, SessionCreate, SessionUpdate
+
+router = APIRouter(prefix="/sessions", tags=["sessions"])
+
+
+@router.post("", status_code=201)
+def create(wanted: SessionCreate, transaction: Writing, response: Response) -> Session:
+    """Begin a session; 409 when the identifier is taken."""
+    made = sessions.create_session(transaction, wanted)
+    response.headers["Location"] = f"/api/v1/sessions/{made.id}"
+    return made
+
+
+@router.get("")
+def list_all(
+    transaction: Reading,
+    response: Response,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+    after: Annotated[Identifier | None, Query(description="last session of the page before")] = None,
+) -> list[Session]:
+    """Newest first; the `Link` header names the next page, when there is one."""
+    found = sessions.list_sessions(transaction, limit + 1, after)
+    if len(found) > limit:
+        query = f"limit={limit}&after={found[limit - 1].id}"
+        response.headers["Link"] = f'</api/v1/sessions?{query}>; rel="next"'
+    return found[:limit]
+
+
+@router.get("/{session}")
+def get(session: Identifier, transaction: Reading) -> Session:
+    """One session."""
+    return sessions.get_session(transaction, session)
+
+
+@router.patch("/{session}")
+def update(session: Identifier, change: SessionUpdate, transaction: Writing) -> Session:
+    """Change what the body names."""
+    return sessions.update_session(transaction, session, change)
+
+
+@router.delete("/{session}", status_code=204)
+async def delete(session: Identifier, services: UseServices) -> None:
+    """Delete a session with everything in it; devices that record into it are cut off."""
+    await services.recorder.delete_session(session)

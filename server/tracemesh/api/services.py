@@ -1,0 +1,56 @@
+"""What the routes use, made once per application."""
+
+import asyncio
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends
+from sqlalchemy.orm import Session as Transaction
+from starlette.requests import HTTPConnection
+
+from tracemesh.api.live.hub import Hub
+from tracemesh.api.recorder import Recorder
+from tracemesh.jobs.runner import JobRunner
+from tracemesh.settings import Settings
+from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.storage.database import Database
+
+
+@dataclass(frozen=True)
+class Services:
+    """Everything that lives as long as the application."""
+
+    settings: Settings
+    database: Database
+    artifacts: ArtifactStore
+    recorder: Recorder
+    hub: Hub
+    runner: JobRunner
+    loop: asyncio.AbstractEventLoop
+
+
+def services(connection: HTTPConnection) -> Services:
+    """The application's services."""
+    found = connection.app.state.services
+    assert isinstance(found, Services)
+    return found
+
+
+UseServices = Annotated[Services, Depends(services)]
+
+
+def reading(services: UseServices) -> Iterator[Transaction]:
+    """A transaction that only reads."""
+    with services.database.read() as transaction:
+        yield transaction
+
+
+def writing(services: UseServices) -> Iterator[Transaction]:
+    """A transaction, committed before the answer is sent."""
+    with services.database.write() as transaction:
+        yield transaction
+
+
+Reading = Annotated[Transaction, Depends(reading)]
+Writing = Annotated[Transaction, Depends(writing, scope="function")]
