@@ -14,8 +14,9 @@ from tracemesh.geometry.closest import ClosestPoints
 from tracemesh.geometry.network import Floats, Ints
 
 _TRIAL_STEPS = 25
+_TRIAL_POINTS = 500
 _STEPS = 200
-_SETTLED = 1e-12
+_SETTLED = 1e-9
 _GOOD = 0.002
 """Misfit with which the start in the same orientation is taken for the right one."""
 _CLEARLY = 0.5
@@ -40,13 +41,14 @@ def register(points: Floats, vertices: Floats, faces: Ints, scaled: bool = False
     """Best placement of points (n, 3) on a mesh, without or with a scale.
 
     Begins with the same orientation; when that does not fit well, also with the principal axes matched in all ways, and
-    returns the best. With a scale, distances are counted in the points' own unit: otherwise zero would be the best scale.
+    returns the best. With a scale, distances are counted in the points' own unit: otherwise the best scale were zero.
     """
     target = _Target(vertices, faces)
     rotations = [np.eye(3), *_axis_matches(points, vertices)]
+    some = points[:: -(-len(points) // _TRIAL_POINTS)]
     best, least = Placement(np.eye(3), np.zeros(3)), np.inf
     for rotation in rotations:
-        placement, misfit = _descend(points, _start(points, vertices, rotation, scaled), target, scaled, _TRIAL_STEPS)
+        placement, misfit = _descend(some, _start(points, vertices, rotation, scaled), target, scaled, _TRIAL_STEPS)
         if misfit < _CLEARLY * least:
             best, least = placement, misfit
         if least < _GOOD:

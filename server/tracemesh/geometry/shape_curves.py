@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from tracemesh.geometry.network import Floats, Ints
 
@@ -89,12 +88,13 @@ class ShapeCurve:
     def node_positions(self) -> Floats:
         """Arc length of each node, (m,) m, increasing."""
         parameter, length = self._arc_length
-        return np.asarray(CubicHermiteSpline(parameter, length, self._speed(parameter))(self.node_parameters))
+        return _hermite(self.node_parameters, parameter, length, self._speed(parameter))
 
     def at(self, arc_length: Floats) -> tuple[Floats, Floats]:
         """Positions (n, 3) m and frames [t N B] (n, 3, 3) at arc lengths (n,) m; closed curves go round and round."""
         wrapped = np.mod(arc_length, self.length) if self.closed else np.clip(arc_length, 0.0, self.length)
-        domain, along = self.path.at(self._parameter_of(wrapped))
+        parameter, length, slowness = self._inverse
+        domain, along = self.path.at(_hermite(wrapped, length, parameter, slowness))
         points, jacobians = self.surface(domain)
         tangent = np.einsum("nij,nj->ni", jacobians, along)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -115,9 +115,20 @@ class ShapeCurve:
         return ends, np.concatenate([[0.0], np.cumsum(pieces)])
 
     @cached_property
-    def _parameter_of(self) -> CubicHermiteSpline:
+    def _inverse(self) -> tuple[Floats, Floats, Floats]:
+        """Parameter by arc length, and its derivative."""
         parameter, length = self._arc_length
-        return CubicHermiteSpline(length, parameter, 1 / self._speed(parameter))
+        return parameter, length, 1 / self._speed(parameter)
+
+
+def _hermite(x: Floats, knots: Floats, values: Floats, slopes: Floats) -> Floats:
+    """Cubic Hermite interpolation at x (n,) between increasing knots (k,)."""
+    k = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(knots) - 2)
+    width = knots[k + 1] - knots[k]
+    t = (x - knots[k]) / width
+    ends = (1 + 2 * t) * (1 - t) ** 2 * values[k] + t**2 * (3 - 2 * t) * values[k + 1]
+    result: Floats = ends + width * t * (1 - t) * ((1 - t) * slopes[k] - t * slopes[k + 1])
+    return result
 
 
 def surface_normals(domain: Floats, jacobians: Floats) -> Floats:
