@@ -235,7 +235,7 @@ def _evaluate(chosen: argparse.Namespace) -> int:
 
 
 def _simulate(chosen: argparse.Namespace) -> int:
-    from tracemesh.formats.meshes import write_truth
+    from tracemesh.formats.meshes import write_triangles
     from tracemesh.formats.rawnet import write_rawnet
     from tracemesh.formats.recordings import recording_from_simulation, scan_from_recordings, write_recording
     from tracemesh.geometry.shapes import SHAPES
@@ -249,7 +249,7 @@ def _simulate(chosen: argparse.Namespace) -> int:
     if chosen.recording:
         outputs[chosen.recording] = write_recording(recording).encode()
     if chosen.truth:
-        outputs[chosen.truth] = write_truth(*shape.mesh(), chosen.truth.suffix.lower().lstrip("."))
+        outputs[chosen.truth] = write_triangles(*shape.mesh(), chosen.truth.suffix.lower().lstrip("."))
     write_all(outputs)
     return 0
 

@@ -5,7 +5,6 @@ built in, tells how far the result is from the truth.
 """
 
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -14,10 +13,10 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from tracemesh.errors import TracemeshError
 from tracemesh.files import write_all
@@ -29,6 +28,8 @@ from tracemesh.terminal import ProgressLine
 SHAPE = "leaf"
 SPEED = 5.0
 """How many times faster than a hand the virtual device is moved."""
+READINGS_PER_SECOND = 60.0
+"""What a Morphorider over Bluetooth answers in the time of the hand."""
 LARGEST_MEAN_ERROR = 1.0
 """% of the diagonal: the thesis's own figure."""
 PATIENCE = 60.0
@@ -103,17 +104,13 @@ def _new_session(server: Server) -> str:
 
 def _scan(server: Server, session: str, folder: Path) -> None:
     """Let the virtual device ride all curves; returns when the server has acknowledged every sample."""
-    with ExitStack() as stack:
-        rider = stack.enter_context(_process(_bridge("virtual", "--shape", SHAPE, "--speed", SPEED), subprocess.PIPE))
-        assert rider.stdout is not None
-        terminal = rider.stdout.readline().strip()
-        if not terminal:
-            raise TracemeshError("the virtual Morphorider did not start")
-        uplink = ("--server", f"http://{server.address}", "--session", session, "--spool", folder / "spool")
-        command = _bridge("morphorider", "--port", terminal, *uplink)
-        bridge = stack.enter_context(_process(command, None, stdin=rider.stdout))
-        if bridge.wait() != 0:
-            raise TracemeshError(f"the bridge stopped with status {bridge.returncode}")
+    port = folder / "morphorider"
+    uplink = ("--server", f"http://{server.address}", "--session", session, "--spool", folder / "spool")
+    device = _bridge("virtual", "--shape", SHAPE, "--speed", SPEED, "--link", port)
+    bridge = _bridge("morphorider", "--port", port, "--rate", READINGS_PER_SECOND * SPEED, *uplink)
+    with _process(device, stdout=subprocess.PIPE) as operator, _process(bridge, stdin=operator.stdout) as recorder:
+        if recorder.wait() != 0:
+            raise TracemeshError(f"the bridge stopped with status {recorder.returncode}")
 
 
 def _reconstruct(server: Server, session: str) -> str:
@@ -135,7 +132,7 @@ def _server(folder: Path, port: int) -> Iterator[Server]:
     port = port or _free_port()
     address = f"127.0.0.1:{port}"
     command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", str(folder / "data")]
-    with _process(command, None, {**os.environ, "TRACEMESH_LOG_LEVEL": "warning"}) as process:
+    with _process(command) as process:
         _await_health(process, address)
         yield Server(address)
 
@@ -166,10 +163,10 @@ def _bridge(*arguments: object) -> list[str]:
 
 @contextmanager
 def _process(
-    command: Sequence[str], stdout: int | None, environment: dict[str, str] | None = None, stdin: Any = None
+    command: Sequence[str], stdin: IO[str] | None = None, stdout: int | None = None
 ) -> Iterator["subprocess.Popen[str]"]:
     """A process that is gone when the block is left."""
-    process = subprocess.Popen(command, stdin=stdin, stdout=stdout, env=environment, text=True)
+    process = subprocess.Popen(command, stdin=stdin, stdout=stdout, text=True)
     try:
         yield process
     finally:

@@ -47,6 +47,15 @@ def write_mesh(
     return writers[extension]()
 
 
+def write_triangles(vertices: Floats, faces: Ints, extension: str) -> bytes:
+    """OBJ, PLY or STL file (z up) of bare triangles; raises InputError for any other extension."""
+    if extension not in ("obj", "ply", "stl"):
+        raise InputError(f"wanted a mesh format among obj, ply, stl, got {extension!r}")
+    options = {"digits": OBJ_DIGITS} if extension == "obj" else {}
+    content: str | bytes = _trimesh(vertices, faces).export(file_type=extension, **options)
+    return content.encode() if isinstance(content, str) else content
+
+
 def read_mesh(content: bytes, extension: str, source: str = "") -> tuple[Floats, Ints]:
     """Vertices (n, 3) m, z up, and triangles (m, 3) of a glb, obj, ply or stl file.
 
