@@ -27,7 +27,7 @@ check: setup  ## formatting, lint, types, import rules
 	$(BIN)/lint-imports --no-cache
 	cd web && npm run check
 
-bench: setup  ## measure and write docs/benchmarks.md
+bench: setup .make/bench  ## measure and write docs/benchmarks.md
 	$(BIN)/python -m benchmarks
 
 clean:  ## remove everything that the other targets made
@@ -36,6 +36,10 @@ clean:  ## remove everything that the other targets made
 .make/python: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@mkdir -p .make && touch $@
+
+.make/bench: pyproject.toml .make/python
+	$(BIN)/python -m pip install --quiet --editable '.[dev,bench]'
 	@mkdir -p .make && touch $@
 
 .make/npm: web/package-lock.json
