@@ -53,6 +53,12 @@ class Link:
             self._said = words
             self._say(f"{self.name}: {state}" + (f": {words}" if words else ""))
 
+    def down(self, why: str) -> None:
+        """The connection is gone, or could not be made: search again."""
+        if self.state in (LinkState.LIVE, LinkState.STALE):
+            self.to(LinkState.LOST, why)
+        self.to(LinkState.SEARCHING, why)
+
 
 class Source(Protocol):
     """A device. Blocking code in a thread of its own: sources stay simple, and a slow one delays nobody else."""

@@ -172,10 +172,12 @@ class Process:
         wait_until(lambda: words in self.said or self._process.poll() is not None, words)
         assert words in self.said, self.said
 
-    def type(self, keys: str) -> None:
+    def type(self, keys: str) -> int:
+        """Press keys; how many."""
         assert self._process.stdin is not None
         self._process.stdin.write(keys.encode())
         self._process.stdin.flush()
+        return len(keys)
 
     def stop(self, number: int) -> int:
         """Send a signal and wait for the end."""

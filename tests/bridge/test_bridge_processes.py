@@ -2,9 +2,11 @@
 
 import resource
 import signal
+import time
 
 import pytest
 
+from tracemesh.geometry.shapes import cone
 from tracemesh.wire.device import CurveEnd, CurveStart, ErrorMessage, NodeMark
 
 
@@ -50,21 +52,19 @@ def test_what_the_device_sent_is_stored(bench):
     assert not list((bench.folder / "spool").glob("*/*")), "all is acknowledged: nothing may stay"
 
 
-def test_the_virtual_operator_drives_the_bridge(bench):
-    device = bench.virtual("--noise", "0")
-    bridge = bench.bridge()
-    bridge.says("device: live")
-    device.stop(signal.SIGTERM)
-    bridge.says("device: lost")
-    again = bench.virtual("--shape", "cone")
+def test_the_virtual_operator_scans_a_whole_shape(bench):
+    device = bench.virtual("--shape", "cone", "--speed", "6")
+    bridge = bench.bridge("--rate", "5000")
     typed = 0
-    while len(bench.server.stored) == 0 or not any(isinstance(m, CurveEnd) for m in bench.server.messages):
-        bridge.type(again.keys[typed:].decode())
-        typed = len(again.keys)
-        bench.samples(1)
-    start, *marks, end = (m for m in bench.server.messages if isinstance(m, CurveStart | NodeMark | CurveEnd))
-    assert (start.curve, end.curve) == (0, 0)
-    assert len(marks) > 1
+    while "quitting" not in bridge.said:
+        typed += bridge.type(device.keys[typed:].decode())
+        time.sleep(0.005)
+    assert bridge.wait() == 0
+    assert device.wait() == 0
+    marks = [(m.curve, m.node) for m in bench.server.messages if isinstance(m, NodeMark)]
+    expected = [(c, int(n)) for c, curve in enumerate(cone().curves) for n in curve.node_ids]
+    assert marks == expected
+    assert all(is_slice(bench.server.frames(c), bench.sent()) for c in range(len(cone().curves)))
 
 
 @pytest.mark.parametrize("server_is_there", [True, False])

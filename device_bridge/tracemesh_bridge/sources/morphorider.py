@@ -67,7 +67,7 @@ class Morphorider:
                     with open_port(port, self._settings.timeout) as line:
                         yield from self._frames(line, port, stop)
                 except (OSError, serial.SerialException) as error:
-                    self._lost(f"{port}: {_words(error)}")
+                    self._link.down(f"{port}: {_words(error)}")
             stop.wait(SEARCH_PERIOD)
 
     def _frames(self, line: serial.Serial, port: str, stop: threading.Event) -> Iterator[Reading]:
@@ -81,7 +81,7 @@ class Morphorider:
                 self._link.to(LinkState.LIVE, port)
                 yield reading
             elif now - last_good > LOST_AFTER:
-                self._lost(f"{port}: no good answer for {LOST_AFTER:.0f} s; is the device switched on?")
+                self._link.down(f"{port}: no good answer for {LOST_AFTER:.0f} s; is the device switched on?")
                 return
             elif now - last_good > STALE_AFTER and self._link.state is LinkState.LIVE:
                 self._link.to(LinkState.STALE, f"{port}: no good answer for {STALE_AFTER:.0f} s")
@@ -112,11 +112,6 @@ class Morphorider:
             self._health.fault("implausible" if whole else "short" if data else "late")
             drain(line)
             return None
-
-    def _lost(self, words: str) -> None:
-        if self._link.state in (LinkState.LIVE, LinkState.STALE):
-            self._link.to(LinkState.LOST, words)
-        self._link.to(LinkState.SEARCHING, words)
 
 
 class _Odometer:

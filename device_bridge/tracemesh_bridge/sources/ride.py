@@ -45,7 +45,7 @@ class Ride:
     def time(self) -> float:
         """s since the ride began with the first request."""
         if self._settings.pace == "request":
-            return self.requests / self._plan.handling.rate
+            return self.requests * self._settings.speed / self._plan.handling.rate
         return 0.0 if self._began is None else (time.monotonic() - self._began) * self._settings.speed
 
     @property
