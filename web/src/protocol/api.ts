@@ -1,4 +1,4 @@
-import type { Curve, Problem, Reconstruction, ReconstructionParameters, Session } from "../wire.gen";
+import type { Curve, CurveUpdate, Problem, Reconstruction, ReconstructionParameters, RecordingSummary, Session } from "../wire.gen";
 
 /** An answer of the server that is not a success, in its own words. */
 export class ApiProblem extends Error {
@@ -14,6 +14,9 @@ export class ApiProblem extends Error {
 
 type Body = string | Blob;
 
+/** As many sessions as the server lists at once. */
+const MOST_SESSIONS = 500;
+
 /** The REST API of the server that sent this page. */
 export class Api {
   constructor(
@@ -22,7 +25,7 @@ export class Api {
   ) {}
 
   sessions(): Promise<Session[]> {
-    return this.#json<Session[]>("GET", "/sessions");
+    return this.#json<Session[]>("GET", `/sessions?limit=${MOST_SESSIONS}`);
   }
 
   session(id: string): Promise<Session> {
@@ -43,6 +46,20 @@ export class Api {
 
   curves(session: string): Promise<Curve[]> {
     return this.#json<Curve[]>("GET", `/sessions/${session}/curves`);
+  }
+
+  updateCurve(session: string, index: number, change: Partial<CurveUpdate>): Promise<Curve> {
+    return this.#json<Curve>("PATCH", `/sessions/${session}/curves/${index}`, JSON.stringify(change));
+  }
+
+  recordings(session: string): Promise<RecordingSummary[]> {
+    return this.#json<RecordingSummary[]>("GET", `/sessions/${session}/recordings`);
+  }
+
+  /** Take in a rawnet or a recording as if a device had sent it. */
+  async upload(session: string, file: Blob): Promise<RecordingSummary> {
+    const path = `/sessions/${session}/recordings`;
+    return (await (await this.#request("POST", path, file, "application/octet-stream")).json()) as RecordingSummary;
   }
 
   reconstruct(session: string, parameters: Partial<ReconstructionParameters>): Promise<Reconstruction> {

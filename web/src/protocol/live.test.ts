@@ -5,9 +5,9 @@ import type { ToBrowser } from "./messages";
 class FakeSocket {
   onopen: (() => void) | null = null;
   onmessage: ((event: { data: string }) => void) | null = null;
-  onclose: (() => void) | null = null;
-  close(): void {
-    this.onclose?.();
+  onclose: ((event: { code: number }) => void) | null = null;
+  close(code = 1006): void {
+    this.onclose?.({ code });
   }
 }
 
@@ -65,6 +65,13 @@ describe("LiveSocket", () => {
     expect(waiting).toEqual([]);
     expect(states.at(-1)).toBe("closed");
     expect(sockets).toHaveLength(1);
+  });
+
+  it("gives up when the session is gone", () => {
+    const { sockets, waiting, states } = setup();
+    sockets[0]?.close(4404);
+    expect(waiting).toEqual([]);
+    expect(states.at(-1)).toBe("closed");
   });
 
   it("opens a fresh connection when asked to", () => {

@@ -23,6 +23,8 @@ export const browser: LiveSurroundings = {
 
 const FIRST_PAUSE = 250;
 const LONGEST_PAUSE = 8000;
+/** Close code that tells that the session was deleted. */
+const SESSION_GONE = 4404;
 
 /** Pause before the n-th attempt to connect again, ms. */
 export function pauseBefore(attempt: number): number {
@@ -63,7 +65,7 @@ export class LiveSocket {
     this.#socket = socket;
     socket.onopen = () => this.handlers.state("open");
     socket.onmessage = (event: MessageEvent<string>) => this.#receive(event.data);
-    socket.onclose = () => this.#lost();
+    socket.onclose = (event) => this.#lost(event.code);
   }
 
   #receive(text: string): void {
@@ -72,8 +74,9 @@ export class LiveSocket {
     if (message) this.handlers.message(message);
   }
 
-  #lost(): void {
+  #lost(code: number): void {
     if (this.#closed) return;
+    if (code === SESSION_GONE) return this.close();
     this.handlers.state("waiting");
     this.#cancelRetry = this.surroundings.later(() => this.#connect(), pauseBefore(this.#attempt));
     this.#attempt += 1;

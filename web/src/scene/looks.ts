@@ -13,13 +13,13 @@ export interface Look {
 
 const LIT = /* glsl */ `
   vec3 lit(vec3 color, vec3 n, vec3 v) {
-    float key = max(dot(n, normalize(vec3(-0.45, 0.75, 0.6))), 0.0);
-    float fill = max(dot(n, normalize(vec3(0.8, -0.1, 0.45))), 0.0);
+    float key = max(dot(n, normalize(vec3(-0.35, 0.6, 0.75))), 0.0);
+    float fill = max(dot(n, normalize(vec3(0.8, -0.1, 0.3))), 0.0);
     float sky = 0.5 + 0.5 * n.y;
     float rim = pow(1.0 - max(dot(n, v), 0.0), 4.0);
-    vec3 h = normalize(v + normalize(vec3(-0.45, 0.75, 0.6)));
+    vec3 h = normalize(v + normalize(vec3(-0.35, 0.6, 0.75)));
     float gloss = 0.12 * pow(max(dot(n, h), 0.0), 40.0);
-    return color * (0.1 + 0.16 * sky + 0.72 * key * key + 0.2 * fill) + 0.04 * rim + gloss;
+    return color * (0.16 + 0.2 * sky + 0.72 * key * key + 0.16 * fill) + 0.04 * rim + gloss;
   }
   float stripes(float phase) {
     float width = max(fwidth(phase), 1e-5);
@@ -40,7 +40,7 @@ export const looks: readonly Look[] = [
     label: "Isophotes",
     hint: "Lines of equal brightness: kinks show a jump of the normal's change",
     chunk: `${LIT} vec3 look(vec3 n, vec3 v) {
-      float band = stripes(12.0 * acos(clamp(dot(n, normalize(vec3(-0.45, 0.75, 0.6))), -1.0, 1.0)) / 3.14159265);
+      float band = stripes(12.0 * acos(clamp(dot(n, normalize(vec3(-0.35, 0.6, 0.75))), -1.0, 1.0)) / 3.14159265);
       return lit(mix(base * 0.12, base * 1.1, band), n, v);
     }`,
   },

@@ -1,4 +1,5 @@
 import { Color } from "three";
+import type { Inks } from "./picture";
 
 /** The colours of the scene: the same tokens that the panels use. */
 export interface Palette {
@@ -24,4 +25,11 @@ export function readPalette(element: Element): Palette {
     surface: token("surface"),
     inside: token("surface-inside"),
   };
+}
+
+/** The colours of labels in a picture, from the same tokens. */
+export function readInks(element: Element): Inks {
+  const style = getComputedStyle(element);
+  const token = (name: string): string => style.getPropertyValue(`--${name}`).trim();
+  return { ink: token("ink"), paper: token("raised"), accent: token("accent") };
 }

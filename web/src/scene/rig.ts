@@ -64,8 +64,10 @@ export class Rig {
     this.#goal = { target: point.clone(), position: point.clone().add(offset) };
   }
 
+  /** From the object to the eye, or to where the eye is going. */
   direction(): Vector3 {
-    return this.camera.position.clone().sub(this.controls.target).normalize();
+    const { position, target } = this.#goal ?? { position: this.camera.position, target: this.controls.target };
+    return position.clone().sub(target).normalize();
   }
 
   /** Go on for `seconds`, or at once when they are infinite; true while there is way left. */

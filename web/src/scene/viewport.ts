@@ -2,21 +2,19 @@ import { Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from "three";
 import { boundingBox, type Box, type Vector } from "../geometry/vectors";
 import { roundDown } from "../geometry/units";
 import type { Network } from "../state/network";
+import type { OverlayContent, Place } from "../state/overlay";
 import { CurvesLayer } from "./curves";
+import { Decorations } from "./decorations";
 import type { LoadedSurface } from "./glb";
 import { Ground } from "./ground";
 import type { LookName } from "./looks";
 import type { Palette } from "./palette";
+import { drawOverlay, type Inks } from "./picture";
 import { Rig, VIEWS } from "./rig";
 import { SurfaceLayer } from "./surface";
 
 const TRANSITION_SECONDS = 0.2;
 const GRID_LINES = 8;
-
-export interface Projected {
-  readonly x: number;
-  readonly y: number;
-}
 
 export interface ViewportEvents {
   /** A frame was drawn: overlays follow now. */
@@ -28,6 +26,7 @@ export interface ViewportEvents {
 /** The 3D view: draws when something changed, and only then. */
 export class Viewport {
   readonly rig: Rig;
+  readonly decorations: Decorations;
   readonly #renderer: WebGLRenderer;
   readonly #scene = new Scene();
   readonly #curves: CurvesLayer;
@@ -46,11 +45,12 @@ export class Viewport {
     private readonly events: ViewportEvents,
   ) {
     this.#renderer = new WebGLRenderer({ canvas, antialias: true });
-    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.#renderer.setPixelRatio(pixelRatio());
     this.rig = new Rig(canvas, () => events.grabbed(), () => this.invalidate());
     this.#curves = new CurvesLayer(palette);
     this.#ground = new Ground(palette.grid);
-    this.#scene.add(this.#ground.object, this.#curves.object);
+    this.decorations = new Decorations(palette);
+    this.#scene.add(this.#ground.object, this.#curves.object, this.decorations.object);
     this.#scene.background = palette.background;
     this.#resizer = new ResizeObserver(() => this.#resize());
     this.#resizer.observe(canvas);
@@ -103,6 +103,7 @@ export class Viewport {
     this.#scene.background = palette.background;
     this.#curves.recolor(palette);
     this.#ground.recolor(palette.grid);
+    this.decorations.recolor(palette);
     this.#surface?.recolor(palette);
     this.invalidate();
   }
@@ -131,7 +132,7 @@ export class Viewport {
   }
 
   /** Where a point (m) is on the screen, CSS px; undefined behind the eye. */
-  project(point: ArrayLike<number>): Projected | undefined {
+  project(point: ArrayLike<number>): Place | undefined {
     const v = new Vector3(point[0], point[1], point[2]).project(this.rig.camera);
     if (v.z > 1) return undefined;
     const { clientWidth: width, clientHeight: height } = this.canvas;
@@ -146,6 +147,22 @@ export class Viewport {
     return this.rig.metresPerPixel(this.canvas.clientHeight);
   }
 
+  /** A PNG of the view with its labels, `scale` pixels to each CSS px. */
+  async picture(scale: number, overlay: OverlayContent, inks: Inks): Promise<Blob> {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const sheet = new OffscreenCanvas(width * scale, height * scale);
+    const context = sheet.getContext("2d");
+    if (!context) throw new Error("This browser cannot make pictures.");
+    this.#renderer.setPixelRatio(scale);
+    this.#renderer.render(this.#scene, this.rig.camera);
+    context.drawImage(this.canvas, 0, 0);
+    context.scale(scale, scale);
+    drawOverlay(context, overlay, inks);
+    this.#renderer.setPixelRatio(pixelRatio());
+    this.invalidate();
+    return sheet.convertToBlob({ type: "image/png" });
+  }
+
   /** Ask for one more frame. */
   invalidate(): void {
     if (this.#frame) return;
@@ -158,6 +175,7 @@ export class Viewport {
     this.rig.dispose();
     this.#curves.dispose();
     this.#ground.dispose();
+    this.decorations.dispose();
     this.#surface?.dispose();
     this.#renderer.dispose();
   }
@@ -198,4 +216,8 @@ export class Viewport {
     this.rig.resize(width, height);
     this.invalidate();
   }
+}
+
+function pixelRatio(): number {
+  return Math.min(devicePixelRatio, 2);
 }

@@ -11,7 +11,7 @@ export function figuresOf(report: Report): Figure[] {
   const surface = report.surface ?? {};
   const candidates: (Figure | undefined)[] = [
     figure("Triangles", surface["faces"], formatCount),
-    figure("Smallest angle", surface["min_angle_deg"], (degrees) => `${degrees.toFixed(1)}°`),
+    figure("Smallest angle", surface["min_angle"], (degrees) => `${degrees.toFixed(1)}°`),
     figure("Patches", surface["patches"], formatCount),
     figure("Step", report.network?.["step"], formatLength),
     figure("Time", report.seconds, formatSeconds),

@@ -23,6 +23,11 @@ it("joins the segments of a scanned curve and keeps the nodes' numbers", () => {
   expect(network.nodes.get(1)?.position).toEqual([1, 1, 0]);
 });
 
+it("gives the nodes the numbers that people marked", () => {
+  const file = { points: [[0, 0, 0], [1, 0, 0]] as const, normals: [up, up], nodes: [0, 1], segments: [] };
+  expect([...networkFromFile(file, [3, 8]).nodes.keys()]).toEqual([3, 8]);
+});
+
 it("draws a curve in pieces when its segments do not meet", () => {
   const network = networkFromFile({
     points: [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]],

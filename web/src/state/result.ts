@@ -30,22 +30,26 @@ export interface NetworkFile {
 /** Fetch the artifacts of a finished reconstruction. */
 export async function loadResult(api: Api, reconstruction: Reconstruction): Promise<Result> {
   const { artifacts } = reconstruction;
-  const [file, report] = await Promise.all([
+  const [file, report, curves] = await Promise.all([
     api.artifact<NetworkFile>(artifacts["network.json"] ?? ""),
     api.artifact<Report>(artifacts["report.json"] ?? ""),
+    api.curves(reconstruction.session),
   ]);
+  const marked = new Set(curves.flatMap((curve) => curve.marks.map((mark) => mark.node)));
   return {
     reconstruction,
     report,
-    network: networkFromFile(file),
+    network: networkFromFile(file, [...marked].sort((a, b) => a - b)),
     positions: Float32Array.from(file.points.flat()),
     normals: Float32Array.from(file.normals.flat()),
     meshUrl: artifacts["mesh.glb"],
   };
 }
 
-/** The drawn form of a network file: the segments of a scanned curve joined into one polyline where they meet. */
-export function networkFromFile(file: NetworkFile): Network {
+/** The drawn form of a network file: the segments of a scanned curve joined into one polyline where they meet.
+ *
+ * A file does not name its nodes; `marked` are the numbers that people gave them, in rising order. */
+export function networkFromFile(file: NetworkFile, marked: readonly number[] = []): Network {
   const network = new Network();
   let spare = Math.max(0, ...file.segments.map((segment) => segment.curve)) + 1;
   const chains = new Map<number, { points: number[]; boundary: boolean }>();
@@ -64,7 +68,7 @@ export function networkFromFile(file: NetworkFile): Network {
       ended: true,
       positions: points.flatMap((i) => [...(file.points[i] ?? [])]),
     })),
-    nodes: file.nodes.map((point, node) => ({ node, position: [...(file.points[point] ?? [0, 0, 0])] })),
+    nodes: file.nodes.map((point, i) => ({ node: marked[i] ?? i, position: [...(file.points[point] ?? [0, 0, 0])] })),
   });
   return network;
 }

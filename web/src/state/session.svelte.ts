@@ -2,7 +2,7 @@ import { type Api, ApiProblem } from "../protocol/api";
 import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
 import type { ToBrowser } from "../protocol/messages";
 import { polylineLength } from "../geometry/vectors";
-import type { LiveDevice, Reconstruction, ReconstructionParameters, Session } from "../wire.gen";
+import type { LiveDevice, Reconstruction, ReconstructionParameters, RecordingSummary, Session } from "../wire.gen";
 import { Network } from "./network";
 import { loadResult, type Result } from "./result";
 
@@ -29,12 +29,15 @@ export class SessionStore {
   nodes = $state.raw<readonly number[]>([]);
   reconstruction = $state.raw<Reconstruction>();
   result = $state.raw<Result>();
+  recordings = $state.raw<readonly RecordingSummary[]>([]);
   problem = $state("");
   /** Counts changes of the drawn network. */
   revision = $state(0);
   /** Counts those changes after which points lie elsewhere. */
   replacements = $state(0);
   #socket: LiveSocket | undefined;
+  /** The newest reconstruction whose results were asked for: none is shown twice, none after a newer one. */
+  #loading: string | undefined;
   #listTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
@@ -81,26 +84,27 @@ export class SessionStore {
   }
 
   async rename(name: string): Promise<void> {
-    await this.#attempt(async () => (this.session = await this.api.renameSession(this.id, name)));
+    await this.#command(async () => (this.session = await this.api.renameSession(this.id, name)));
   }
 
   async reconstruct(parameters: Partial<ReconstructionParameters>): Promise<void> {
-    await this.#attempt(async () => this.#progressed(await this.api.reconstruct(this.id, parameters)));
+    await this.#command(async () => this.#progressed(await this.api.reconstruct(this.id, parameters)));
   }
 
   async cancel(): Promise<void> {
     const { reconstruction } = this;
-    if (reconstruction) await this.#attempt(async () => this.#progressed(await this.api.cancel(reconstruction.id)));
+    if (reconstruction) await this.#command(async () => this.#progressed(await this.api.cancel(reconstruction.id)));
   }
 
   #fold(message: Exclude<ToBrowser, LiveDevice | { type: "live.reconstruction" }>): void {
     const change = this.live.apply(message);
     if (change === "gap") return this.#socket?.restart();
+    if (message.type === "live.snapshot" || message.type === "live.curve.start") void this.#listRecordings();
     if (message.type === "live.snapshot") {
       this.#heard(message.devices);
       if (message.reconstruction) this.#progressed(message.reconstruction);
     }
-    if (message.type === "live.curve.start" || message.type === "live.points") this.result = undefined;
+    if (message.type === "live.curve.start" || message.type === "live.points") this.#outdate();
     if (change === "replaced") this.replacements += 1;
     this.revision += 1;
     this.#listSoon();
@@ -117,11 +121,29 @@ export class SessionStore {
   }
 
   async #show(reconstruction: Reconstruction): Promise<void> {
-    if (this.result?.reconstruction.id === reconstruction.id) return;
+    if (this.#loading === reconstruction.id) return;
+    this.#loading = reconstruction.id;
     this.reconstruction ??= reconstruction;
-    this.result = await loadResult(this.api, reconstruction);
+    const result = await loadResult(this.api, reconstruction);
+    if (this.#loading !== reconstruction.id) return;
+    this.result = result;
+    this.#redraw();
+  }
+
+  /** Points were scanned that no result has: show what is live. */
+  #outdate(): void {
+    if (!this.result) return;
+    this.result = undefined;
+    this.#redraw();
+  }
+
+  #redraw(): void {
     this.replacements += 1;
     this.revision += 1;
+  }
+
+  async #listRecordings(): Promise<void> {
+    await this.#attempt(async () => (this.recordings = await this.api.recordings(this.id)));
   }
 
   /** The list of curves changes with every message; a person reads it a few times a second. */
@@ -139,10 +161,15 @@ export class SessionStore {
     }, LIST_PAUSE);
   }
 
+  /** What a person asked for: an older problem is not theirs any more. */
+  async #command(work: () => Promise<unknown>): Promise<void> {
+    this.problem = "";
+    await this.#attempt(work);
+  }
+
   async #attempt(work: () => Promise<unknown>): Promise<void> {
     try {
       await work();
-      this.problem = "";
     } catch (error) {
       this.problem = inWords(error);
     }

@@ -1,3 +1,4 @@
+import type { Vector } from "../geometry/vectors";
 import type { LookName } from "../scene/looks";
 
 export type Theme = "light" | "dark";
@@ -10,6 +11,14 @@ export class ViewStore {
   nodes = $state(true);
   grid = $state(true);
   surface = $state(true);
+  normals = $state(false);
+  spikes = $state(false);
+  plot = $state(false);
+  /** True while two points are being picked; the points so far, m. */
+  measuring = $state(false);
+  measured = $state.raw<readonly Vector[]>([]);
+  /** The point (m) that the plot's cursor is at. */
+  pointed = $state.raw<Vector>();
   highlighted = $state<number>();
   help = $state(false);
   theme = $state<Theme>("light");
@@ -24,6 +33,16 @@ export class ViewStore {
     const chosen = memory.getItem("theme");
     const preferred = matches("(prefers-color-scheme: dark)") ? "dark" : "light";
     this.setTheme(chosen === "light" || chosen === "dark" ? chosen : preferred);
+  }
+
+  toggleMeasuring(): void {
+    this.measuring = !this.measuring;
+    this.measured = [];
+  }
+
+  /** One more end of the measured distance; a third begins a new one. */
+  measure(point: Vector): void {
+    this.measured = this.measured.length === 2 ? [point] : [...this.measured, point];
   }
 
   toggleTheme(): void {
