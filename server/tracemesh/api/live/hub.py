@@ -1,6 +1,7 @@
 """All rooms and all devices; the only place where what is recorded meets what is watched."""
 
 import asyncio
+import logging
 from collections import defaultdict
 from collections.abc import Awaitable, Callable
 from concurrent.futures.process import BrokenProcessPool
@@ -16,6 +17,9 @@ from tracemesh.storage.reconstructions import list_reconstructions
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.device import Recorded, Samples
 from tracemesh.wire.resources import Reconstruction
+
+
+log = logging.getLogger(__name__)
 
 
 class Hub:
@@ -95,6 +99,7 @@ class Hub:
                 tracker = SessionTracker.load(transaction, session)
                 return tracker, next(iter(list_reconstructions(transaction, session)), None)
 
+        await self._flush()  # what was accepted before somebody watched is told to nobody: it must be in the database
         return await asyncio.to_thread(read)
 
     async def _solve(self, session: str) -> SolvedNetwork | None:
@@ -105,4 +110,6 @@ class Hub:
                 return await asyncio.wrap_future(self._slot.submit(solve_attached, self._database_url, session))
             except BrokenProcessPool:
                 self._slot.renew()
-                return None
+            except Exception:
+                log.exception("session %s: the network could not be solved; its curves are drawn as reckoned", session)
+            return None
