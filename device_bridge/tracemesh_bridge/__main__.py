@@ -1,6 +1,7 @@
-"""python -m tracemesh_bridge: the same as the command `tracemesh-bridge`."""
+"""python -m tracemesh_bridge: the same as tracemesh-bridge."""
+
+import sys
 
 from tracemesh_bridge.cli import main
 
-if __name__ == "__main__":
-    main()
+sys.exit(main())

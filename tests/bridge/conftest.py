@@ -151,7 +151,7 @@ class Process:
     def __init__(self, *arguments: str) -> None:
         environment = {**os.environ, "TRACEMESH_TOKEN": "secret", "PYTHONWARNINGS": "error"}
         self._process = subprocess.Popen(
-            [sys.executable, "-c", "import sys; from tracemesh_bridge.cli import main; sys.exit(main())", *arguments],
+            [sys.executable, "-m", "tracemesh_bridge", *arguments],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment,
         )  # fmt: skip
         self.said = ""
