@@ -23,9 +23,10 @@ _GATE = 4.0  # median absolute deviations (scaled to standard deviations) that a
 class CleanCurve:
     """One curve with strictly increasing distance.
 
-    distance: (n,) m. quaternion: (n, 4), w first, signs aligned, of the frames [t N B]. tangent: (n, 3) as measured, not
-    made orthogonal to the normal. marks: (m,) m, distances of the marked nodes, increasing; nodes: (m,) their numbers.
-    index: place of the curve in the scan. dropped: how many samples were outliers.
+    distance: (n,) m. quaternion: (n, 4), w first, signs aligned, of the frames [t N B]. tangent: (n, 3) as measured,
+    not made orthogonal to the normal. marks: (m,) m, distances of marked nodes, increasing; nodes: (m,) their numbers.
+    index: place of the curve in the scan. samples, dropped: how many were measured, and left
+    out as outliers.
     """
 
     distance: Floats
@@ -36,6 +37,7 @@ class CleanCurve:
     closed: bool
     boundary: bool
     index: int
+    samples: int
     dropped: int
 
 
@@ -162,6 +164,7 @@ def clean_curve(curve: CurveScan, index: int) -> CleanCurve:
         curve.closed,
         curve.boundary,
         index,
+        len(bad),
         int(bad.sum()),
     )
 

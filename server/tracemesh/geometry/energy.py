@@ -3,8 +3,8 @@
     E = sum h |X_k - A_k|^2 + stretch^2 sum |X_k - X_{k+1}|^2 / h
         + bend^4 sum |skew(X_k^T (X_{k+1}/h_+ + X_{k-1}/h_-))|^2 / h_k + stiffness sum_nodes |N_j - N_l|^2
 
-The data term carries h, so that stretch and bend are lengths in metres and the minimiser does not depend on h. A step is
-X_k <- X_k exp(w_k). Curvature is exact for the first two terms and Gauss-Newton for the others, whose residuals are small.
+The data term carries h, so that stretch and bend are lengths in metres and the minimiser does not depend on h. A step
+is X_k <- X_k exp(w_k). Its Hessian is exact for the first two terms and Gauss-Newton for the others.
 """
 
 from dataclasses import dataclass
@@ -49,6 +49,7 @@ class Stencil:
     """
 
     def __init__(self, layout: Layout) -> None:
+        """Number the unknowns."""
         is_repeat = np.zeros(layout.size, bool)
         is_repeat[layout.first[1:][layout.closed] - 1] = True
         self.row: Ints = np.cumsum(~is_repeat) - 1
@@ -82,9 +83,10 @@ def _node_pairs(layout: Layout, row: Ints) -> Ints:
 
 
 class Pattern:
-    """Fixed upper sparsity pattern of block matrices (3u, 3u) given as lists of 3 x 3 blocks, with their sum per entry."""
+    """Upper sparsity pattern, found once, of matrices (3u, 3u) that are sums of 3 x 3 blocks at fixed places."""
 
     def __init__(self, block_row: Ints, block_column: Ints, size: int) -> None:
+        """block_row, block_column: (k,) place of each block; one below the diagonal is transposed."""
         swap = block_row > block_column
         self._swap = np.flatnonzero(swap)
         rows = np.where(swap, block_column, block_row)
@@ -94,8 +96,7 @@ class Pattern:
         column = (3 * columns[:, None] + j).ravel()
         used = np.flatnonzero(row <= column)
         keys, slot = np.unique(column[used] * (3 * size) + row[used], return_inverse=True)
-        ones = np.ones(len(used))
-        self._gather = csr_array((ones, (slot, used)), shape=(len(keys), len(row)))
+        self._gather = csr_array((np.ones(len(used)), (slot, used)), shape=(len(keys), len(row)))
         indptr = np.searchsorted(keys // (3 * size), np.arange(3 * size + 1))
         self.matrix = csc_array((np.ones(len(keys)), keys % (3 * size), indptr), shape=(3 * size, 3 * size))
         self.diagonal = indptr[1:] - 1
@@ -104,14 +105,14 @@ class Pattern:
         """Entries of the pattern summed from blocks (k, 3, 3) in the order of construction."""
         if len(self._swap):
             blocks[self._swap] = _transposed(blocks[self._swap])
-        result: Floats = self._gather @ blocks.ravel()
-        return result
+        return np.asarray(self._gather @ blocks.ravel())
 
 
 class Energy:
     """Value, gradient and second-order model of the energy over one stencil."""
 
     def __init__(self, stencil: Stencil) -> None:
+        """Find the pattern."""
         self._s = s = stencil
         u = np.arange(s.size)
         b, c, a = s.before, s.centre, s.after
@@ -124,7 +125,7 @@ class Energy:
         """vee(skew(X_k^T (X_+ / h_+ + X_- / h_-))) (b, 3); turn: X_left^T X_right (e, 3, 3)."""
         s = self._s
         v = 0.5 * skew_vector(turn)
-        return v[s.edge_out] / s.h_out[:, None] - v[s.edge_in] / s.h_in[:, None]
+        return np.asarray(v[s.edge_out] / s.h_out[:, None] - v[s.edge_in] / s.h_in[:, None])
 
     def value(self, frames: Floats, data: Floats, weights: Weights) -> float:
         """E at frames (u, 3, 3) for data frames (u, 3, 3)."""

@@ -16,14 +16,15 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _LOOSE = -1  # node number of an end at which no node was marked
+_SHORTEST_END = 0.02  # of a curve's length: what lies before its first mark may be no more than the pause there
 
 
 @dataclass(frozen=True)
 class PlacedCurve:
     """A curve from its first to its last node; arc length is 0 at the first.
 
-    arc: (n,) m, increasing. quaternion: (n, 4), w first, signs aligned. tangent: (n, 3) as measured. marks: (m,) m, first
-    0 and last the curve's length; nodes: (m,) their numbers as scanned, -1 for an end that was not marked.
+    arc: (n,) m, increasing. quaternion: (n, 4), w first, signs aligned. tangent: (n, 3) as measured. marks: (m,) m,
+    first 0 and last the curve's length; nodes: (m,) their numbers as scanned, -1 for an end that was not marked.
     index: place of the curve in the scan.
     """
 
@@ -42,19 +43,20 @@ class PlacedCurve:
         return float(self.marks[-1])
 
 
-def _with_ends(curve: CleanCurve, keep_ends: bool) -> tuple[Floats, Ints]:
-    """Marks and nodes of an open curve, its unmarked ends among them where they are wanted or needed."""
+def _with_ends(curve: CleanCurve) -> tuple[Floats, Ints]:
+    """Marks and nodes of an open curve; its unmarked ends are among them where too few nodes were marked."""
     marks, nodes = curve.marks, curve.nodes
-    if keep_ends or len(marks) < 2:
-        low, high = curve.distance[0], curve.distance[-1]
-        before, after = not len(marks) or low < marks[0], not len(marks) or high > marks[-1]
-        marks = np.concatenate([[low] * before, marks, [high] * after])
-        nodes = np.concatenate([[_LOOSE] * before, nodes, [_LOOSE] * after]).astype(np.int64)
-    return marks, nodes
+    if len(marks) >= 2:
+        return marks, nodes
+    low, high = curve.distance[0], curve.distance[-1]
+    least = _SHORTEST_END * (high - low)
+    before, after = not len(marks) or low + least < marks[0], not len(marks) or high - least > marks[-1]
+    marks = np.concatenate([[low] * before, marks, [high] * after])
+    return marks, np.concatenate([[_LOOSE] * before, nodes, [_LOOSE] * after]).astype(np.int64)
 
 
-def _place_open(curve: CleanCurve, keep_ends: bool) -> PlacedCurve:
-    marks, nodes = _with_ends(curve, keep_ends)
+def _place_open(curve: CleanCurve) -> PlacedCurve:
+    marks, nodes = _with_ends(curve)
     return _cut(curve, curve.distance, curve.quaternion, curve.tangent, marks, nodes)
 
 
@@ -92,13 +94,12 @@ def _cut(
     )
 
 
-def place_curve(curve: CleanCurve, keep_ends: bool = False) -> PlacedCurve:
+def place_curve(curve: CleanCurve) -> PlacedCurve:
     """The curve from its first to its last node; raises ScanError, naming it, if nothing is left.
 
-    An open curve with fewer than two nodes keeps its loose ends in any case; keep_ends keeps those of all, as in a scan
-    that is still under way.
+    An open curve with fewer than two nodes, such as one that is still being scanned, keeps its loose ends.
     """
-    return _place_closed(curve) if curve.closed else _place_open(curve, keep_ends)
+    return _place_closed(curve) if curve.closed else _place_open(curve)
 
 
 def number_nodes(curves: Sequence[PlacedCurve]) -> tuple[list[Ints], Bools]:

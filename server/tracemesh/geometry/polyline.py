@@ -1,7 +1,7 @@
 """Which way tangents are meant: along the curve at a sample, or along the chord to the next sample (a polyline).
 
-Networks exported from meshes carry chords. Integrated as such they close to rounding; a smooth curve's tangents do not, and
-close better in second order. The closure residual of the whole network tells which.
+Networks exported from meshes carry chords. Integrated as such they close to rounding; a smooth curve's tangents do not,
+and close better in second order. The closure residual of the whole network tells which.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracemesh.geometry.placement import PlacedCurve, measured_layout
+from tracemesh.geometry.placement import PlacedCurve
 from tracemesh.geometry.positions import Positions, solve_positions
 from tracemesh.geometry.rotations import normalized
 from tracemesh.geometry.samples import Layout
@@ -39,6 +39,13 @@ class MeasuredNetwork:
         """Length of the bounding box's diagonal, m."""
         return float(np.linalg.norm(np.ptp(self.positions.points, axis=0)))
 
+    def displacement(self, curve: int) -> float:
+        """How far from its start a curve ends, m, before the network pulls it together."""
+        own = self.layout.segment_curve == curve
+        a, b = self.layout.segment_rows[own].T
+        moved = self.positions.points[b] - self.positions.points[a] - self.positions.gaps[own]
+        return float(np.linalg.norm(moved.sum(axis=0)))
+
 
 def _tangents(curves: Sequence[PlacedCurve], layout: Layout) -> tuple[Floats, Floats]:
     """Measured tangent that holds after each row (n, 3), and the tangent interpolated at each row (n, 3)."""
@@ -56,9 +63,8 @@ def _residual(positions: Positions) -> float:
     return float(np.sqrt(np.mean(np.sum(positions.gaps**2, axis=1))))
 
 
-def measure_network(curves: Sequence[PlacedCurve]) -> MeasuredNetwork:
-    """Positions of connected curves as measured, under the convention that closes them better."""
-    layout = measured_layout(curves)
+def measure_network(curves: Sequence[PlacedCurve], layout: Layout) -> MeasuredNetwork:
+    """Positions of connected curves at the rows of their measured layout, under the convention that closes better."""
     chord, smooth = _tangents(curves, layout)
     rows, h = layout.edges, layout.lengths[:, None]
     chords = solve_positions(layout, h * chord[rows])

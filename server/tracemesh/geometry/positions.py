@@ -1,8 +1,8 @@
 """Positions of all curves at once from their edges (thesis 3.6, Eq. 3.31).
 
-Least squares on the edges, not on their divergence as in the thesis's rows: its normal equations are the graph Laplacian
-of the network. A segment's interior follows its nodes linearly in arc length, which leaves a small Laplacian over the
-nodes and O(n) else. Both are exact for frames without noise; on noisy ones the edges estimate better.
+Least squares on the edges, not on their divergence as in the thesis's rows: its normal equations are the graph
+Laplacian of the network. A segment's interior follows its nodes linearly in arc length, which leaves a small Laplacian
+over the nodes and O(n) else. On frames without noise both are exact; from noisy ones the edges estimate better.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,6 @@ from scipy.sparse.linalg import splu
 
 from tracemesh.errors import ScanError
 from tracemesh.geometry.cleaning import curve_name
-from tracemesh.geometry.rotations import left_jacobian, log
 from tracemesh.geometry.samples import Layout
 
 Floats = NDArray[np.float64]
@@ -33,12 +32,9 @@ class Positions:
     gaps: Floats
 
 
-def arc_edges(layout: Layout, frames: Floats) -> Floats:
-    """Edge vectors (e, 3), m, between frames (n, 3, 3): h X J_l(omega) e1, exact on lines, circles and helices."""
-    start = frames[layout.edges]
-    turn = log(np.swapaxes(start, 1, 2) @ frames[layout.edges + 1])
-    direction = np.einsum("nij,nj->ni", start, left_jacobian(turn)[:, :, 0])
-    result: Floats = layout.lengths[:, None] * direction
+def segment_vectors(layout: Layout, edges: Floats) -> Floats:
+    """Sum (s, 3) of the edge vectors (e, 3) of each segment, m."""
+    result: Floats = np.add.reduceat(edges, np.searchsorted(layout.edges, layout.segment_rows[:, 0]), axis=0)
     return result
 
 
@@ -68,7 +64,8 @@ def node_positions(layout: Layout, vectors: Floats, weights: Floats) -> Floats:
     np.add.at(right, a, -weights[:, None] * vectors)
     points = np.zeros((count, 3))
     points[1:] = splu(laplacian.tocsc()[1:, 1:]).solve(right[1:])
-    return points - points.mean(axis=0)
+    points -= points.mean(axis=0)
+    return points
 
 
 def solve_positions(layout: Layout, edges: Floats) -> Positions:
@@ -76,7 +73,7 @@ def solve_positions(layout: Layout, edges: Floats) -> Positions:
 
     Minimises the sum over edges of |x_{k+1} - x_k - e_k|^2 / h_k: every metre travelled errs alike.
     """
-    vectors = np.add.reduceat(edges, np.searchsorted(layout.edges, layout.segment_rows[:, 0]), axis=0)
+    vectors = segment_vectors(layout, edges)
     nodes = node_positions(layout, vectors, 1 / layout.segment_lengths)
     a, b = layout.segment_nodes.T
     gaps = nodes[b] - nodes[a] - vectors

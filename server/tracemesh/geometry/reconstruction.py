@@ -1,7 +1,7 @@
 """From a scan to a curve network: every step of thesis chapter 3 in order."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,25 +10,37 @@ from numpy.typing import NDArray
 
 from tracemesh.errors import ScanError
 from tracemesh.geometry.assembly import assemble_network, per_point
-from tracemesh.geometry.cleaning import clean_curves
+from tracemesh.geometry.cleaning import CleanCurve, clean_curves, curve_name
+from tracemesh.geometry.closing import Closing, close_network
+from tracemesh.geometry.correction import correct_curves
 from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.network_report import bias_report, fit_warnings
 from tracemesh.geometry.placement import PlacedCurve, measured_layout, place_curve, uniform_layout
-from tracemesh.geometry.polyline import measure_network, points_on_polyline
-from tracemesh.geometry.positions import arc_edges, check_connected, solve_positions
-from tracemesh.geometry.regression import RegressionSolver
+from tracemesh.geometry.polyline import MeasuredNetwork, measure_network, points_on_polyline
+from tracemesh.geometry.positions import Positions, check_connected, solve_positions
+from tracemesh.geometry.quadrature import edge_vectors
+from tracemesh.geometry.regression import Regression, RegressionSolver
 from tracemesh.geometry.resampling import resample
+from tracemesh.geometry.samples import Layout, NetworkSamples
 from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.uncertainty import point_uncertainty
+from tracemesh.geometry.weights import choose_weights
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
+
+_STAGES = ("cleaning", "measuring", "resampling", "weighing", "closing", "smoothing", "positions", "uncertainty")
+_OPEN_GAP = 0.2  # of its length that a closed curve may lack as measured; a half circle lacks 0.64
 
 
 @dataclass(frozen=True)
 class NetworkParameters:
     """step: m between samples; None: step_fraction of the diagonal estimated from the scan. stretch, bend: smoothing
-    lengths, m; None: automatic. weights: automatic ones by cross-validation, or the thesis's lambda = mu = 1.
-    curve_bias: estimate a heading and a scale per curve always, never, or where the data speak for it.
+    lengths, m; None: automatic, or 0 if only the other is given. weights: automatic ones by cross-validation, or the
+    thesis's lambda = mu = 1 in metres. curve_bias: estimate a rotation and a scale per curve and how far its nodes are
+    from their marks: where the data speak for it, always, or never.
     """
 
     step: float | None = None
@@ -41,72 +53,186 @@ class NetworkParameters:
 
 @dataclass(frozen=True)
 class NetworkResult:
-    """network: the reconstruction. frames: (n, 3, 3) [t N B] at its points, those of a node being of its first curve.
-    report: what was done, JSON-able. uncertainty: (n,) m, standard uncertainty of each point, or None.
+    """network: the reconstruction. frames: (n, 3, 3) [t N B] at its points, a node's being of its first curve.
+    uncertainty: (n,) m, root mean square distance of each point from the truth. report: what was done, JSON-able.
     """
 
     network: CurveNetwork
     frames: Floats
+    uncertainty: Floats
     report: dict[str, object]
-    uncertainty: Floats | None
 
 
 class _Stages:
-    """Tells how far the work is and how long each stage took."""
+    """Says how far the work is and how long each stage took."""
 
-    def __init__(self, names: tuple[str, ...], progress: Progress | None) -> None:
-        self._names, self._progress = names, progress
-        self._start = time.perf_counter()
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._current: str | None = None
+        self._start = 0.0
         self.seconds: dict[str, float] = {}
 
     def begin(self, name: str) -> None:
         """Close the running stage and announce the next; may raise Cancelled."""
         self.end()
-        self._current, self._start = name, time.perf_counter()
         if self._progress is not None:
-            self._progress(name, self._names.index(name) / len(self._names))
+            self._progress(name, _STAGES.index(name) / len(_STAGES))
+        self._current, self._start = name, time.perf_counter()
 
     def end(self) -> None:
         """Close the running stage."""
-        if hasattr(self, "_current"):
+        if self._current is not None:
             self.seconds[self._current] = time.perf_counter() - self._start
+            self._current = None
 
 
-_STAGES = ("cleaning", "measuring", "resampling", "smoothing", "positions", "assembly")
+class NetworkReconstruction:
+    """A scan made ready, so that other smoothing lengths cost only what depends on them."""
+
+    def __init__(
+        self, scan: Scan, parameters: NetworkParameters | None = None, progress: Progress | None = None
+    ) -> None:
+        """Do all that comes before the regression; raises ScanError naming the curve that prevents it."""
+        self._parameters = NetworkParameters() if parameters is None else parameters
+        _check_parameters(self._parameters)
+        self._stages = _Stages(progress)
+        self._stages.begin("cleaning")
+        self._cleaned = _cleaned(scan)
+        curves = tuple(place_curve(curve) for curve in self._cleaned)
+        self._indices = np.array([c.index for c in curves])
+        self._stages.begin("measuring")
+        self._measured = self._measure(curves)
+        given = self._parameters.step
+        self._step = given if given is not None else self._parameters.step_fraction * self._measured.diagonal
+        self._stages.begin("resampling")
+        samples = resample(curves, uniform_layout(curves, self._step), self._step)
+        self._stages.begin("weighing")
+        self._choice = choose_weights(curves, samples, self._step, _given_weights(self._parameters))
+        self._stages.begin("closing")
+        self._closing: Closing | None = None
+        self._samples = self._close(curves, samples)
+        self._solver = RegressionSolver(self._samples.layout)
+        self._stages.end()
+
+    def _measure(self, curves: Sequence[PlacedCurve]) -> MeasuredNetwork:
+        layout = measured_layout(curves)
+        check_connected(layout, self._indices)
+        measured = measure_network(curves, layout)
+        _check_closed(curves, measured)
+        return measured
+
+    def _close(self, curves: Sequence[PlacedCurve], samples: NetworkSamples) -> NetworkSamples:
+        """Samples of curves freed from their errors as a whole, if they have any; a polyline is exact as it is."""
+        if self._measured.is_polyline:
+            return samples
+        mode = self._parameters.curve_bias
+        self._closing = close_network(curves, samples.layout, self._choice, self._step, mode)
+        if not self._closing.variances.with_bias:
+            return samples
+        corrected = correct_curves(curves, self._closing.corrections)
+        return resample(corrected, uniform_layout(corrected, self._step), self._step)
+
+    def solve(self, weights: Weights | None = None) -> NetworkResult:
+        """The network, smoothed with the chosen weights or with others; the latter starts from the solution before."""
+        layout = self._samples.layout
+        self._stages.begin("smoothing")
+        regression = self._solver.solve(self._samples.frames, weights or self._choice.weights)
+        self._stages.begin("positions")
+        positions = self._positions(layout, regression.frames)
+        self._stages.begin("uncertainty")
+        uncertainty = self._uncertainty(layout, positions, regression.frames)
+        network = assemble_network(layout, positions.points, regression.frames, self._indices)
+        self._stages.end()
+        report = self._report(network, regression, positions, weights or self._choice.weights, uncertainty)
+        return NetworkResult(network, per_point(layout, regression.frames), per_point(layout, uncertainty), report)
+
+    def _uncertainty(self, layout: Layout, positions: Positions, frames: Floats) -> Floats:
+        if self._closing is None:
+            return np.full(layout.size, self._measured.chord_residual)
+        closing, tangent = self._closing, frames[:, :, 0]
+        expected = point_uncertainty(closing.adjustment, layout, positions.points, tangent, closing.walk)
+        return expected * closing.noise_factor(layout, positions.gaps)
+
+    def _positions(self, layout: Layout, frames: Floats) -> Positions:
+        if self._measured.is_polyline:
+            return Positions(points_on_polyline(self._measured, layout), self._measured.positions.gaps)
+        return solve_positions(layout, edge_vectors(layout, frames))
+
+    def _report(
+        self,
+        network: CurveNetwork,
+        regression: Regression,
+        positions: Positions,
+        weights: Weights,
+        uncertainty: Floats,
+    ) -> dict[str, object]:
+        layout, measured = self._samples.layout, self._measured
+        gaps = np.linalg.norm(positions.gaps, axis=1)
+        return {
+            "parameters": {
+                "step_m": self._step,
+                "stretch_m": weights.stretch,
+                "bend_m": weights.bend,
+                "curve_bias": "on" if self._closing and self._closing.variances.with_bias else "off",
+                "tangents": "chords to the next sample" if measured.is_polyline else "tangents of the curve",
+            },
+            "sizes": {
+                "curves": len(self._cleaned),
+                "samples": sum(c.samples for c in self._cleaned),
+                "outliers": sum(c.dropped for c in self._cleaned),
+                "points": len(network.points),
+                "nodes": len(network.nodes),
+                "segments": len(network.segments),
+                "length_m": float(layout.lengths.sum()),
+                "diagonal_m": network.diagonal,
+            },
+            "frame_noise_deg": float(np.rad2deg(self._choice.noise)),
+            "curve_bias": bias_report(self._closing, self._indices),
+            "closure": {"rms_m": float(np.sqrt(np.mean(gaps**2))), "max_m": float(gaps.max())},
+            "uncertainty": {"mean_m": float(uncertainty.mean()), "max_m": float(uncertainty.max())},
+            "regression": {"energy": regression.energy, "iterations": regression.iterations},
+            "seconds": dict(self._stages.seconds),
+            "warnings": fit_warnings(layout, positions.gaps, self._indices),
+        }
 
 
-def _placed(scan: Scan) -> tuple[PlacedCurve, ...]:
+def _cleaned(scan: Scan) -> tuple[CleanCurve, ...]:
     if not scan.curves:
         raise ScanError("the scan holds no curve")
-    return tuple(place_curve(curve) for curve in clean_curves(scan.curves))
+    return clean_curves(scan.curves)
+
+
+def _check_parameters(parameters: NetworkParameters) -> None:
+    for name in ("step", "step_fraction", "stretch", "bend"):
+        value = getattr(parameters, name)
+        least_is_zero = name in ("stretch", "bend")
+        if value is not None and not (np.isfinite(value) and (value > 0 or (value == 0 and least_is_zero))):
+            raise ScanError(
+                f"{name} must be a {'number of at least 0' if least_is_zero else 'positive number'}, got {value}"
+            )
+
+
+def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> None:
+    """Raise ScanError for the first closed curve whose tangents do not lead back to its start."""
+    for i, curve in enumerate(curves):
+        missing = measured.displacement(i)
+        if curve.closed and missing > _OPEN_GAP * curve.length:
+            raise ScanError(
+                f"{curve_name(curve.index)} is marked as closed, but ends {missing:.3g} m from where it began "
+                f"({100 * missing / curve.length:.0f} % of its length)"
+            )
+
+
+def _given_weights(parameters: NetworkParameters) -> Weights | None:
+    if parameters.weights == "thesis":
+        return Weights(1.0, 1.0)
+    if parameters.stretch is None and parameters.bend is None:
+        return None
+    return Weights(parameters.stretch or 0.0, parameters.bend or 0.0)
 
 
 def reconstruct_network(
     scan: Scan, parameters: NetworkParameters | None = None, progress: Progress | None = None
 ) -> NetworkResult:
     """Curve network of a scan; raises ScanError naming the curve, and whatever `progress` raises between stages."""
-    chosen = NetworkParameters() if parameters is None else parameters
-    stages = _Stages(_STAGES, progress)
-    stages.begin("cleaning")
-    curves = _placed(scan)
-    indices = np.array([c.index for c in curves])
-    stages.begin("measuring")
-    check_connected(measured_layout(curves), indices)
-    measured = measure_network(curves)
-    step = chosen.step if chosen.step is not None else chosen.step_fraction * measured.diagonal
-    stages.begin("resampling")
-    layout = uniform_layout(curves, step)
-    samples = resample(curves, layout, step)
-    stages.begin("smoothing")
-    weights = Weights(0.0, 2 * step)
-    regression = RegressionSolver(layout).solve(samples.frames, weights)
-    stages.begin("positions")
-    if measured.is_polyline:
-        points = points_on_polyline(measured, layout)
-    else:
-        points = solve_positions(layout, arc_edges(layout, regression.frames)).points
-    stages.begin("assembly")
-    network = assemble_network(layout, points, regression.frames, indices)
-    stages.end()
-    report: dict[str, object] = {"stages": stages.seconds}
-    return NetworkResult(network, per_point(layout, regression.frames), report, None)
+    return NetworkReconstruction(scan, parameters, progress).solve()

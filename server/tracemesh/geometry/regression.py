@@ -34,6 +34,7 @@ class RegressionSolver:
     """Minimises the energy of one layout for changing data and weights."""
 
     def __init__(self, layout: Layout) -> None:
+        """Find the pattern."""
         self._stencil = Stencil(layout)
         self._energy = Energy(self._stencil)
         self._factors: qdldl.Solver | None = None

@@ -16,6 +16,7 @@ from tracemesh.geometry.samples import Layout, NetworkSamples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 _WIDTH = 0.5  # standard deviation of the Gaussian, in steps
 _REACH = 3.0  # standard deviations after which it is cut
@@ -23,17 +24,19 @@ _NEAREST = 2  # measured samples on each side that a fit sees, however sparse th
 _RIDGE = 1e-9  # keeps a fit to few samples solvable; relative to the sum of weights
 
 
-def _extended(curve: PlacedCurve, margin: float) -> tuple[Floats, Floats]:
+def _extended(curve: PlacedCurve, margin: float, used: Bools | None) -> tuple[Floats, Floats]:
     """Measured arcs and quaternions; those of a closed curve go round beyond both ends by `margin` m or two samples."""
+    arc, quaternion = curve.arc, curve.quaternion
+    if used is not None and np.count_nonzero(used) > 2 * _NEAREST:
+        arc, quaternion = arc[used], quaternion[used]
     if not curve.closed:
-        return curve.arc, curve.quaternion
-    n, length = len(curve.arc), curve.length
-    before = min(int(np.searchsorted(curve.arc, length - margin)), n - _NEAREST - 1)
-    after = max(int(np.searchsorted(curve.arc, margin, side="right")), _NEAREST + 1)
-    arc = np.concatenate([curve.arc[before:] - length, curve.arc, curve.arc[:after] + length])
-    ends = [curve.quaternion[before:], curve.quaternion, curve.quaternion[:after]]
-    flip = -1.0 if ends[1][-1] @ ends[1][0] < 0 else 1.0
-    return arc, np.concatenate([flip * ends[0], ends[1], flip * ends[2]])
+        return arc, quaternion
+    n, length = len(arc), curve.length
+    before = max(min(int(np.searchsorted(arc, length - margin)), n - _NEAREST - 1), 0)
+    after = max(int(np.searchsorted(arc, margin, side="right")), _NEAREST + 1)
+    flip = -1.0 if quaternion[-1] @ quaternion[0] < 0 else 1.0
+    around = np.concatenate([arc[before:] - length, arc, arc[:after] + length])
+    return around, np.concatenate([flip * quaternion[before:], quaternion, flip * quaternion[:after]])
 
 
 def _windows(arc: Floats, places: Floats, step: float) -> tuple[Ints, Ints, Floats]:
@@ -76,14 +79,17 @@ def fit_matrix(arc: Floats, places: Floats, step: float) -> csr_array:
     return csr_array((weights, column, indptr), shape=(len(places), len(arc)))
 
 
+def resample_curve(curve: PlacedCurve, places: Floats, step: float, used: Bools | None = None) -> Floats:
+    """Unit quaternions (k, 4) at increasing arcs (k,), m, on a curve; used: (n,) which measured samples to fit."""
+    arc, quaternion = _extended(curve, _REACH * _WIDTH * step, used)
+    fitted: Floats = normalized(fit_matrix(arc, places, step) @ quaternion)
+    if curve.closed and places[-1] == curve.length:
+        fitted[-1] = fitted[0]
+    return fitted
+
+
 def resample(curves: Sequence[PlacedCurve], layout: Layout, step: float) -> NetworkSamples:
     """Frames of curves at the rows of a layout with the given step, m."""
-    frames = []
-    for i, curve in enumerate(curves):
-        arc, quaternion = _extended(curve, _REACH * _WIDTH * step)
-        places = layout.arc[layout.first[i] : layout.first[i + 1]]
-        fitted = normalized(fit_matrix(arc, places, step) @ quaternion)
-        if curve.closed:
-            fitted[-1] = fitted[0]
-        frames.append(quaternion_to_matrix(fitted))
-    return NetworkSamples(layout, np.concatenate(frames))
+    rows = [slice(*layout.first[i : i + 2]) for i in range(len(curves))]
+    fitted = [resample_curve(c, layout.arc[r], step) for c, r in zip(curves, rows, strict=True)]
+    return NetworkSamples(layout, quaternion_to_matrix(np.concatenate(fitted)))

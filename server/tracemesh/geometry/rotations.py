@@ -120,3 +120,23 @@ def darboux_frames(tangent: Floats, normal: Floats) -> Floats:
     n = normalized(normal)
     t = normalized(tangent - np.sum(tangent * n, axis=-1, keepdims=True) * n)
     return np.stack([t, n, np.cross(t, n)], axis=-1)
+
+
+def quaternion_difference(to: Floats, origin: Floats) -> Floats:
+    """Rotation vectors (..., 3), rad, of to origin^-1, of unit quaternions (..., 4) less than half a turn apart."""
+    w = np.sum(to * origin, axis=-1, keepdims=True)
+    u, v = to[..., 1:], origin[..., 1:]
+    vector = origin[..., :1] * u - to[..., :1] * v - np.cross(u, v)
+    vector = np.where(w < 0, -vector, vector)
+    sine = np.linalg.norm(vector, axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, np.abs(w))
+    result: Floats = np.where(sine < _SMALL, 2.0, angle / np.maximum(sine, _SMALL)) * vector
+    return result
+
+
+def quaternion_product(first: Floats, second: Floats) -> Floats:
+    """Quaternions (..., 4), w first, of the rotation by `second` followed by that by `first`."""
+    w, v, u, r = first[..., :1], first[..., 1:], second[..., :1], second[..., 1:]
+    scalar = w * u - np.sum(v * r, axis=-1, keepdims=True)
+    result: Floats = np.concatenate([scalar, w * r + u * v + np.cross(v, r)], axis=-1)
+    return result

@@ -17,8 +17,8 @@ class Layout:
 
     arc: (n,) m, arc length on the row's own curve, increasing. first: (c + 1,) first row of each curve.
     closed, boundary: (c,). marks: (m,) rows at nodes, increasing; the first and last row of every curve are among them.
-    nodes: (m,) node at each mark, 0 to k - 1. is_node: (k,) false where a closed curve without nodes was merely started.
-    A closed curve repeats its first row last.
+    nodes: (m,) node at each mark, 0 to k - 1. is_node: (k,) false where a closed curve without nodes was merely
+    started. A closed curve repeats its first row last.
     """
 
     arc: Floats
@@ -83,6 +83,14 @@ class Layout:
         starts = np.zeros(self.size, np.int64)
         starts[self.segment_rows[:, 0]] = 1
         return np.cumsum(starts[self.edges]) - 1
+
+    @cached_property
+    def row_segment(self) -> Ints:
+        """Segment (n,) of each row; a node's is the one that begins there, or ends where none begins."""
+        segment = np.empty(self.size, np.int64)
+        segment[self.edges + 1] = self.edge_segment
+        segment[self.edges] = self.edge_segment
+        return segment
 
     @cached_property
     def segment_lengths(self) -> Floats:

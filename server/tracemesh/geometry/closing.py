@@ -1,0 +1,54 @@
+"""Whether the curves of a network have errors as a whole, and which: variances first, then the adjustment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracemesh.geometry.adjustment import Adjustment, Corrections
+from tracemesh.geometry.bias import Variances, estimate_variances
+from tracemesh.geometry.misclosure import Misclosures
+from tracemesh.geometry.placement import PlacedCurve
+from tracemesh.geometry.samples import Layout
+from tracemesh.geometry.weights import Choice, noise_level
+
+Floats = NDArray[np.float64]
+
+_FIRST_SHIFT = 0.05  # steps: a first guess at the deviation of node marks
+
+
+@dataclass(frozen=True)
+class Closing:
+    """How a network closes. gain: logarithm of how much likelier errors of whole curves make it, penalised.
+
+    walk: (c,) m, variance per metre and axis of each curve's positions.
+    """
+
+    variances: Variances
+    adjustment: Adjustment
+    corrections: Corrections
+    gain: float
+    walk: Floats
+
+    def noise_factor(self, layout: Layout, gaps: Floats) -> float:
+        """Ratio, at least 1, of the noise that the gaps (s, 3), m, of final positions show to the one expected."""
+        loops = len(gaps) - layout.node_count + 1
+        if not loops:
+            return 1.0
+        expected = self.walk[layout.segment_curve] * layout.segment_lengths
+        return float(max(1.0, np.sqrt(np.sum(np.sum(gaps**2, axis=1) / expected) / (3 * loops))))
+
+
+def close_network(
+    curves: Sequence[PlacedCurve], layout: Layout, choice: Choice, step: float, mode: Literal["auto", "on", "off"]
+) -> Closing:
+    """Errors of whole curves, if `mode` asks for them or the data speak for them, from the smoothed frames of `choice`."""
+    noise = noise_level(curves, choice, step)
+    misclosures = Misclosures(layout, choice.frames, noise)
+    without, with_bias = estimate_variances(misclosures, _FIRST_SHIFT * step)
+    gain = with_bias.evidence - without.evidence
+    variances = with_bias if mode == "on" or (mode == "auto" and gain > 0) else without
+    adjustment = Adjustment(misclosures, variances)
+    return Closing(variances, adjustment, adjustment.solution(), gain, noise.walk * variances.segments)

@@ -1,0 +1,46 @@
+"""What a reconstruction tells about itself, in words and JSON-able numbers."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracemesh.geometry.cleaning import curve_name
+from tracemesh.geometry.closing import Closing
+from tracemesh.geometry.samples import Layout
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_BAD_FIT = 6.0  # times the median of gaps per root of length
+_WORTH_A_WARNING = 0.02  # of a segment's length
+
+
+def bias_report(closing: Closing | None, indices: Ints) -> dict[str, object]:
+    """Errors of whole curves as found; evidence: logarithm of how much likelier they make the network."""
+    if closing is None or not closing.variances.with_bias:
+        return {"on": False, "evidence": closing.gain if closing else None}
+    variances, corrections = closing.variances, closing.corrections
+    axes = np.sqrt(np.maximum(np.linalg.eigvalsh(variances.rotation), 0.0))
+    curves = [
+        {"curve": int(index) + 1, "rotation_deg": np.rad2deg(rotation).tolist(), "scale": float(scale)}
+        for index, rotation, scale in zip(indices, corrections.rotation, corrections.scale, strict=True)
+    ]
+    return {
+        "on": True,
+        "evidence": closing.gain,
+        "rotation_deviation_deg": np.rad2deg(axes).tolist(),
+        "scale_deviation": float(np.sqrt(variances.scale)),
+        "mark_deviation_m": float(np.sqrt(variances.shift)),
+        "curves": curves,
+    }
+
+
+def fit_warnings(layout: Layout, gaps: Floats, indices: Ints) -> list[str]:
+    """Segments whose gaps (s, 3), m, stand out: most likely a node with a wrong number or a wrong mark."""
+    gap = np.linalg.norm(gaps, axis=1)
+    rate = gap / np.sqrt(layout.segment_lengths)
+    bad = (rate > _BAD_FIT * np.median(rate)) & (gap > _WORTH_A_WARNING * layout.segment_lengths)
+    return [
+        f"{curve_name(indices[layout.segment_curve[s]])} misses its node by {gap[s]:.2g} m on a segment of "
+        f"{layout.segment_lengths[s]:.2g} m: is a node number wrong?"
+        for s in np.flatnonzero(bad)
+    ]

@@ -1,0 +1,127 @@
+"""The regression's linear twin: a smoothing spline through frames developed into R^3.
+
+Along a curve frames A_k are developed as u_k = sum log(A_{k+1} A_k^T), in the world's axes; a frame near A is
+exp(d) A with d in R^3. In d the energy of Eq. 3.30 without nodes is, to second order, that of a smoothing spline, the
+same for the three axes: one banded system, which makes cross-validation cheap. Closed curves are treated as open.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+
+from tracemesh.geometry.energy import Weights
+from tracemesh.geometry.placement import PlacedCurve
+from tracemesh.geometry.rotations import (
+    align_signs,
+    exp,
+    log,
+    matrix_to_quaternion,
+    normalized,
+    quaternion_difference,
+)
+from tracemesh.geometry.samples import NetworkSamples
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """Measured frames as rotation vectors from the resampled frames interpolated where they were measured.
+
+    value: (m, 3) rad, world. row: (m,) layout row before each; fraction: (m,) of the way to the next row.
+    weight: (m,) m, length of curve that the sample stands for. start: (c + 1,) first sample of each curve.
+    """
+
+    value: Floats
+    row: Ints
+    fraction: Floats
+    weight: Floats
+    start: Ints
+
+    def predicted(self, offset: Floats) -> Floats:
+        """Offsets (n, 3) at rows, interpolated at the measured samples (m, 3)."""
+        f = self.fraction[:, None]
+        result: Floats = (1 - f) * offset[self.row] + f * offset[self.row + 1]
+        return result
+
+
+def measured_offsets(curves: Sequence[PlacedCurve], samples: NetworkSamples) -> Offsets:
+    """Offsets of everything measured between the ends of a layout's curves."""
+    layout = samples.layout
+    rows, fractions, weights, quaternions = [], [], [], []
+    for curve, first, last in zip(curves, layout.first[:-1], layout.first[1:] - 1, strict=True):
+        arc = layout.arc[first : last + 1]
+        cell = np.clip(np.searchsorted(arc, curve.arc, side="right") - 1, 0, len(arc) - 2)
+        rows.append(first + cell)
+        fractions.append((curve.arc - arc[cell]) / (arc[cell + 1] - arc[cell]))
+        weights.append(np.gradient(curve.arc))
+        quaternions.append(curve.quaternion)
+    row, fraction = np.concatenate(rows), np.concatenate(fractions)
+    grid = align_signs(matrix_to_quaternion(samples.frames))
+    between = normalized((1 - fraction[:, None]) * grid[row] + fraction[:, None] * grid[row + 1])
+    start = np.concatenate([[0], np.cumsum([len(r) for r in rows])])
+    value = quaternion_difference(np.concatenate(quaternions), between)
+    return Offsets(value, row, fraction, np.concatenate(weights), start)
+
+
+class DevelopedSpline:
+    """Smoothing splines over the rows of resampled frames, for changing data and weights."""
+
+    def __init__(self, samples: NetworkSamples) -> None:
+        """Develop the frames and find the stencils."""
+        layout = samples.layout
+        self._n, self._edge, self._h = layout.size, layout.edges, layout.lengths
+        self._samples = samples
+        self._rate = log(samples.frames[self._edge + 1] @ np.swapaxes(samples.frames[self._edge], 1, 2))
+        self._rate /= self._h[:, None]
+        inner = np.flatnonzero(np.diff(self._edge) == 1)
+        self._centre = self._edge[inner] + 1
+        before, after = self._h[inner], self._h[inner + 1]
+        self._bend_weight = 2 / (before + after)
+        self._bend_stencil = np.stack([1 / before, -1 / before - 1 / after, 1 / after])
+        self._bend = self._rate[inner + 1] - self._rate[inner]
+
+    def data_band(self, offsets: Offsets, weight: Floats) -> tuple[Floats, Floats]:
+        """Normal matrix (3, n), upper banded, and right-hand side (n, 3) of measured offsets with weights (m,)."""
+        n, row, f = self._n, offsets.row, offsets.fraction
+        band = np.zeros((3, n))
+        band[2] = np.bincount(row, weight * (1 - f) ** 2, n) + np.bincount(row + 1, weight * f**2, n)
+        band[1] = np.bincount(row + 1, weight * f * (1 - f), n)
+        right = np.empty((n, 3))
+        for axis in range(3):
+            value = weight * offsets.value[:, axis]
+            right[:, axis] = np.bincount(row, value * (1 - f), n) + np.bincount(row + 1, value * f, n)
+        return band, right
+
+    def penalty_band(self, weights: Weights) -> tuple[Floats, Floats]:
+        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the stretching and bending terms."""
+        n, edge = self._n, self._edge
+        stretch, bend = weights.stretch**2, weights.bend**4
+        band, right = np.zeros((3, n)), np.zeros((n, 3))
+        band[2] = np.bincount(edge, stretch / self._h, n) + np.bincount(edge + 1, stretch / self._h, n)
+        band[1, edge + 1] = -stretch / self._h
+        right[edge] += stretch * self._rate
+        right[edge + 1] -= stretch * self._rate
+        weight, rows = bend * self._bend_weight, (self._centre - 1, self._centre, self._centre + 1)
+        a, b, c = self._bend_stencil
+        for at, coefficient in zip(rows, self._bend_stencil, strict=True):
+            band[2, at] += weight * coefficient**2
+            right[at] -= (weight * coefficient)[:, None] * self._bend
+        band[1, rows[1]] += weight * a * b
+        band[1, rows[2]] += weight * b * c
+        band[0, rows[2]] += weight * a * c
+        return band, right
+
+    def solve(self, data: tuple[Floats, Floats], penalty: tuple[Floats, Floats]) -> Floats:
+        """Offsets (n, 3), rad, of the smooth frames from the resampled ones."""
+        result: Floats = solveh_banded(data[0] + penalty[0], data[1] + penalty[1], check_finite=False)
+        return result
+
+    def frames(self, offset: Floats) -> Floats:
+        """Frames (n, 3, 3) at offsets (n, 3), rad, from the resampled ones."""
+        result: Floats = exp(offset) @ self._samples.frames
+        return result

@@ -1,0 +1,114 @@
+"""Smoothing lengths by cross-validation on held-out measured samples.
+
+A fifth of the samples, in short runs, is left out; a spline through the rest predicts them. Runs of a part of a step
+keep the neighbours of a left-out sample, whose errors a sensor's filter may have made alike, out of its prediction.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracemesh.geometry.energy import Weights
+from tracemesh.geometry.misclosure import NoiseLevel
+from tracemesh.geometry.placement import PlacedCurve
+from tracemesh.geometry.samples import NetworkSamples
+from tracemesh.geometry.spline import DevelopedSpline, Offsets, measured_offsets
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bands = tuple[Floats, Floats]
+
+_FOLDS = 5
+_RUNS_PER_STEP = 4
+_BENDS = 2.0 ** np.arange(-2, 7)  # trials, in steps
+_LEAST_NOISE = 1e-7  # rad: what eight decimals of a unit vector leave
+_SPLINE_GAIN = 0.265  # 3 sqrt(2) / 16: integral of the squared kernel of a smoothing spline of width 1
+_LEAST_BEND = 0.05  # steps: carries the spline over rows that no sample is near
+_STRETCHES = (0.25, 0.5, 1.0)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """weights: those that predict best. noise: rad, root mean square rotation error per axis of a measured frame.
+
+    frames: (n, 3, 3), the spline's with these weights; curves do not know of each other in it.
+    """
+
+    weights: Weights
+    noise: float
+    frames: Floats
+
+
+def _folds(curves: Sequence[PlacedCurve], step: float) -> Ints:
+    """Fold (m,) in which each measured sample is left out; -1 for samples of curves too short to miss any."""
+    folds = []
+    for curve in curves:
+        n = len(curve.arc)
+        spacing = float(np.median(np.diff(curve.arc)))
+        run = min(max(1, round(step / _RUNS_PER_STEP / spacing)), max(1, n // (2 * _FOLDS)))
+        folds.append((np.arange(n) // run) % _FOLDS if n >= 2 * _FOLDS else np.full(n, -1))
+    return np.concatenate(folds)
+
+
+class _Trials:
+    """Prediction error of weights, remembered."""
+
+    def __init__(self, spline: DevelopedSpline, offsets: Offsets, fold: Ints) -> None:
+        self._spline, self._offsets, self._fold = spline, offsets, fold
+        more = _FOLDS / (_FOLDS - 1)
+        self._data: list[Bands] = []
+        for left_out in range(_FOLDS):
+            factor = np.where(fold < 0, 1.0, np.where(fold == left_out, 0.0, more))
+            self._data.append(spline.data_band(offsets, offsets.weight * factor))
+
+    def error(self, weights: Weights) -> float:
+        """Root mean square rotation error per axis, rad, of predicted left-out frames."""
+        penalty = self._spline.penalty_band(weights)
+        total = 0.0
+        for left_out, data in enumerate(self._data):
+            missed = self._offsets.predicted(self._spline.solve(data, penalty)) - self._offsets.value
+            total += float(np.sum(missed[self._fold == left_out] ** 2))
+        return float(np.sqrt(total / max(1, 3 * int(np.count_nonzero(self._fold >= 0)))))
+
+
+def _vertex(logs: list[float], errors: list[float]) -> float:
+    """Minimum of the parabola through three points around a lowest one."""
+    a, b, c = logs
+    x, y, z = errors
+    curvature = (z - y) / (c - b) - (y - x) / (b - a)
+    slope = (z - x) / (c - a)
+    return float(np.clip(b - slope * (c - a) / 2 / curvature, a, c)) if curvature > 0 else float(b)
+
+
+def choose_weights(
+    curves: Sequence[PlacedCurve], samples: NetworkSamples, step: float, given: Weights | None
+) -> Choice:
+    """Weights that predict left-out frames best; where some are given, only their prediction error is found."""
+    offsets = measured_offsets(curves, samples)
+    spline = DevelopedSpline(samples)
+    trials = _Trials(spline, offsets, _folds(curves, step))
+    weights = given if given is not None else _search(trials, step)
+    solvable = Weights(weights.stretch, max(weights.bend, _LEAST_BEND * step))
+    smooth = spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(solvable))
+    return Choice(weights, trials.error(solvable), spline.frames(smooth))
+
+
+def _search(trials: _Trials, step: float) -> Weights:
+    errors = np.array([trials.error(Weights(0.0, b * step)) for b in _BENDS])
+    best = int(errors.argmin())
+    bend = float(_BENDS[best])
+    if 0 < best < len(_BENDS) - 1:
+        around = slice(best - 1, best + 2)
+        bend = float(np.exp(_vertex(np.log(_BENDS[around]).tolist(), [float(e) for e in errors[around]])))
+    found = {stretch: trials.error(Weights(stretch * step, bend * step)) for stretch in (0.0, *_STRETCHES)}
+    return Weights(min(found, key=lambda s: found[s]) * step, bend * step)
+
+
+def noise_level(curves: Sequence[PlacedCurve], choice: Choice, step: float) -> NoiseLevel:
+    """Expected random errors of positions and smoothed normals along curves whose frames have independent errors."""
+    spacing = np.array([c.length / (len(c.arc) - 1) for c in curves])
+    walk = np.maximum(choice.noise, _LEAST_NOISE) ** 2 * spacing
+    width = max(choice.weights.bend, choice.weights.stretch, step)
+    return NoiseLevel(walk, np.sqrt(_SPLINE_GAIN * walk / width))
