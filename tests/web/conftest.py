@@ -1,0 +1,96 @@
+"""The pages as a person meets them: a real server process, a real browser, a device on the real ingest socket."""
+
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+from tracemesh.formats.recordings import recording_from_simulation
+from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.simulation import plan_scan, simulate_scan
+from websockets.sync.client import connect
+
+from tests.web.support import PATIENCE, Rider, Server
+
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = (
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-unsafe-swiftshader",
+)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server with an empty data folder, shared by the tests of a file."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = int(probe.getsockname()[1])
+    data = tmp_path_factory.mktemp("data")
+    command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", str(data)]
+    with (data / "server.log").open("w") as log, subprocess.Popen(command, stderr=log) as process:
+        try:
+            _await_health(f"http://127.0.0.1:{port}/healthz", process)
+            yield Server(f"127.0.0.1:{port}")
+        finally:
+            process.terminate()
+
+
+def _await_health(url: str, process: subprocess.Popen[bytes]) -> None:
+    give_up = time.monotonic() + PATIENCE
+    while time.monotonic() < give_up:
+        assert process.poll() is None, "the server stopped"
+        try:
+            urllib.request.urlopen(url, timeout=1).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return
+    raise AssertionError("the server did not answer")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Headless Chromium of the distribution; WebGL in software."""
+    assert Path(CHROMIUM).exists(), f"wanted Chromium in {CHROMIUM}"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """An empty page that fails the test when a script of it fails."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
+    page = context.new_page()
+    page.set_default_timeout(1000 * PATIENCE)
+    failures: list[str] = []
+    page.on("pageerror", lambda error: failures.append(str(error)))
+    yield page
+    context.close()
+    assert not failures
+
+
+@pytest.fixture
+def rider(server: Server) -> Iterator[Callable[[str], Rider]]:
+    """Connects a Morphorider that will scan the leaf into a session."""
+    with ExitStack() as connections:
+
+        def start(session: str) -> Rider:
+            address = f"ws://{server.address}/api/v1/ingest"
+            connection = connections.enter_context(connect(address, open_timeout=PATIENCE))
+            curves = simulate_scan(plan_scan(leaf()))
+            return Rider(connection, recording_from_simulation(curves, f"ride-{session}", session))
+
+        yield start
