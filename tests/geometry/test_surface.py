@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tracemesh.formats.networks import read_network
-from tracemesh.geometry.quality import mesh_quality, unique_edges
+from tracemesh.geometry.edges import unique_edges
+from tracemesh.geometry.quality import mesh_quality
 from tracemesh.geometry.surface import span_surface
 
 EULER = {

@@ -133,7 +133,9 @@ def _with_inferred_boundary(network: CurveNetwork, cycles: tuple[Cycle, ...]) ->
 
 
 def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...]) -> tuple[Cycle, ...]:
-    """Cycles along boundary segments only. Of the two sides of a lone closed boundary curve, the one that turns less."""
+    """Cycles along boundary segments only. Of the two sides of a lone closed boundary curve, the one that turns
+    less.
+    """
     candidates = [c for c in cycles if all(network.segments[side.segment].boundary for side in c.sides)]
     openings: list[Cycle] = []
     for cycle in sorted(candidates, key=lambda c: c.turning):

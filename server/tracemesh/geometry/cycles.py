@@ -11,7 +11,9 @@ from tracemesh.geometry.network import CurveNetwork, Floats, Ints
 
 @dataclass(frozen=True)
 class HalfSegment:
-    """One side of a segment: index of the segment, and whether the face on its left sees it from first to last point."""
+    """One side of a segment: index of the segment, and whether the face on its left sees it from first to last
+    point.
+    """
 
     segment: int
     forward: bool
@@ -95,7 +97,9 @@ def _following_sides(network: CurveNetwork) -> dict[HalfSegment, HalfSegment]:
 
 
 def _polar_angles(network: CurveNetwork, node: int, sides: list[HalfSegment]) -> NDArray[np.float64]:
-    """(k,) rad, direction of every leaving side in the node's tangent plane (Eq. 4.10), counter-clockwise from outside."""
+    """(k,) rad, direction of every leaving side in the node's tangent plane (Eq. 4.10), counter-clockwise from
+    outside.
+    """
     towards = network.points[[side_points(network, side)[1] for side in sides]] - network.points[node]
     normal = network.normals[node]
     tangent = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])

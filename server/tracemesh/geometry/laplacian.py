@@ -26,14 +26,12 @@ def cotangent_laplacian(corners: Floats, faces: Ints, count: int) -> Laplacian:
 
     corners: (f, 3, d) positions of every face's corners, m. faces: (f, 3) vertex indices below count.
     """
-    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # edge k lies opposite of corner k
-    dots = -(np.roll(edges, -1, axis=1) * np.roll(edges, -2, axis=1)).sum(2)
-    area = triangle_areas(corners)
-    weights = (dots / (4 * area[:, None])).ravel()
+    weights = cotangent_weights(corners).ravel()
     i, j = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel()
     rows, columns = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
     values = np.concatenate([weights, weights, -weights, -weights])
-    return Laplacian(sparse.csr_matrix((values, (rows, columns)), (count, count)), lumped_mass(area, faces, count))
+    stiffness = sparse.csr_matrix((values, (rows, columns)), (count, count))
+    return Laplacian(stiffness, lumped_mass(triangle_areas(corners), faces, count))
 
 
 def intrinsic_delaunay_laplacian(vertices: Floats, faces: Ints) -> Laplacian:
@@ -44,6 +42,15 @@ def intrinsic_delaunay_laplacian(vertices: Floats, faces: Ints) -> Laplacian:
     """
     stiffness, mass = robust_laplacian.mesh_laplacian(vertices, faces)
     return Laplacian(sparse.csr_matrix(-stiffness), np.asarray(mass.diagonal()))
+
+
+def cotangent_weights(corners: Floats) -> Floats:
+    """(f, 3) half the cotangent of the angle at every corner; the weight of the opposite edge. corners: (f, 3,
+    2 or 3).
+    """
+    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # edge k lies opposite of corner k
+    dots = -(np.roll(edges, -1, axis=1) * np.roll(edges, -2, axis=1)).sum(2)
+    return np.asarray(dots / (4 * triangle_areas(corners)[:, None]))
 
 
 def triangle_areas(corners: Floats) -> Floats:

@@ -8,6 +8,7 @@ from tracemesh.errors import SurfaceError
 from tracemesh.geometry.cell_complex import CellComplex, segment_name
 from tracemesh.geometry.curvature import normalised
 from tracemesh.geometry.cycles import Cycle
+from tracemesh.geometry.flattening import flatten
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints
 from tracemesh.geometry.triangulation import triangulate_polygon
 
@@ -16,49 +17,83 @@ from tracemesh.geometry.triangulation import triangulate_polygon
 class PatchMesh:
     """Triangulation of all patches, without positions of the interior vertices.
 
-    faces: (f, 3); vertices below `fixed` are the network's points. patch: (f,) number of the face's cycle.
-    flat: (f, 3, 2) m, corners of the faces, each patch in its own plane. count: number of vertices.
+    planar: (p, 2) m, every patch in its own plane: its boundary, then its interior points. planar_faces: (f, 3) indices
+    into
+    planar. vertex: (p,) the mesh vertex of a planar point; the first `fixed` of `count` vertices are the network's
+    points.
+    patch: (f,) number of the face's cycle. starts: (number of cycles,) first planar point of every patch.
     """
 
-    faces: Ints
+    planar: Floats
+    planar_faces: Ints
+    vertex: Ints
     patch: Ints
-    flat: Floats
+    starts: Ints
     fixed: int
     count: int
 
+    @property
+    def faces(self) -> Ints:
+        """(f, 3) indices of mesh vertices."""
+        return self.vertex[self.planar_faces]
 
-def triangulate_patches(network: CurveNetwork, complex_: CellComplex, spacing: float | None) -> PatchMesh:
-    """Triangulate every face of a cell complex. spacing: edge length inside, m; None takes each patch's own boundary
-    spacing.
+
+def triangulate_patches(
+    network: CurveNetwork, complex_: CellComplex, spacing: float | None, last: tuple[PatchMesh, Floats] | None = None
+) -> PatchMesh:
+    """Triangulate every face of a cell complex.
+
+    spacing: edge length inside, m; None takes each patch's own boundary spacing. last: a triangulation with vertices
+    (n, 3)
+    whose patches are unrolled to be triangulated again; None projects along average normals.
     """
+    unrolled = None if last is None else _unrolled_loops(complex_, *last)
     fixed = count = len(network.points)
-    faces, flat, patch = [], [], []
+    planar, faces, vertex, patch, starts = [], [], [], [], []
+    begin = 0
     for number, cycle in enumerate(complex_.faces):
-        points = network.points[cycle.points]
-        size = spacing or float(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).mean())
-        loop, inside, triangles = _triangulate(network, cycle, size)
-        index = np.concatenate([cycle.points, count + np.arange(len(inside))])
-        count += len(inside)
-        faces.append(index[triangles])
-        flat.append(np.vstack([loop, inside])[triangles])
+        loop, inside, triangles = _triangulate(network, cycle, spacing, unrolled and unrolled[number])
+        planar += [loop, inside]
+        faces.append(triangles + begin)
+        vertex += [cycle.points, count + np.arange(len(inside))]
         patch.append(np.full(len(triangles), number))
-    return PatchMesh(np.vstack(faces), np.concatenate(patch), np.concatenate(flat), fixed, count)
+        starts.append(begin)
+        count += len(inside)
+        begin += len(loop) + len(inside)
+    return PatchMesh(
+        np.vstack(planar),
+        np.vstack(faces),
+        np.concatenate(vertex),
+        np.concatenate(patch),
+        np.array(starts),
+        fixed,
+        count,
+    )
 
 
-def _triangulate(network: CurveNetwork, cycle: Cycle, spacing: float) -> tuple[Floats, Floats, Ints]:
+def _unrolled_loops(complex_: CellComplex, patches: PatchMesh, vertices: Floats) -> list[Floats]:
+    """Boundaries of all patches, unrolled from space into the plane."""
+    planar = flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)
+    return [planar[start : start + len(c.points)] for start, c in zip(patches.starts, complex_.faces, strict=True)]
+
+
+def _triangulate(
+    network: CurveNetwork, cycle: Cycle, spacing: float | None, unrolled: Floats | None
+) -> tuple[Floats, Floats, Ints]:
     """Loop in the plane, interior points and faces of one patch; the first map to the plane that is injective."""
     points, normals = network.points[cycle.points], network.normals[cycle.points]
-    for loop in (project_to_plane(points, normals), map_to_circle(points)):
+    size = spacing or float(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).mean())
+    for loop in (unrolled, project_to_plane(points, normals), map_to_circle(points)):
         try:
-            if loop is not None:
-                return loop, *triangulate_polygon(loop, spacing)
+            if loop is not None and signed_area(loop) > 0:
+                return loop, *triangulate_polygon(loop, size)
         except SurfaceError:
             continue
     raise SurfaceError(f"the patch beside {segment_name(network, cycle.sides[0].segment)} cannot be triangulated")
 
 
 def project_to_plane(points: Floats, normals: Floats) -> Floats | None:
-    """(k, 2) m, projection along the average normal; None if that vanishes or turns the loop over. points, normals: (k,
+    """(k, 2) m, projection along the average normal; None if that vanishes. points, normals: (k,
     3).
     """
     average = normals.mean(0)
@@ -66,8 +101,7 @@ def project_to_plane(points: Floats, normals: Floats) -> Floats | None:
         return None
     normal = normalised(average)
     first = normalised(np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal))
-    loop = (points - points.mean(0)) @ np.column_stack([first, np.cross(normal, first)])
-    return loop if signed_area(loop) > 0 else None
+    return np.asarray((points - points.mean(0)) @ np.column_stack([first, np.cross(normal, first)]))
 
 
 def map_to_circle(points: Floats) -> Floats:

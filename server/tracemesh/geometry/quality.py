@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from tracemesh.geometry.edges import unique_edges
 from tracemesh.geometry.network import Floats, Ints
 
 
@@ -39,22 +40,6 @@ def mesh_quality(vertices: Floats, faces: Ints, normals: Floats) -> MeshQuality:
         mean_angle=float(np.degrees(smallest.mean())),
         inverted_faces=int(inverted_faces(vertices, faces, normals).sum()),
     )
-
-
-def unique_edges(faces: Ints) -> tuple[Ints, Ints]:
-    """(e, 2) edges, smaller index first, and (e,) the number of faces beside each."""
-    pairs = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    size = int(faces.max()) + 1
-    keys, count = np.unique(pairs[:, 0] * size + pairs[:, 1], return_counts=True)
-    return np.column_stack([keys // size, keys % size]), count
-
-
-def boundary_vertices(faces: Ints, count: int) -> NDArray[np.bool_]:
-    """(n,) whether a vertex lies on an edge with one face."""
-    edges, beside = unique_edges(faces)
-    mask = np.zeros(count, bool)
-    mask[edges[beside == 1]] = True
-    return mask
 
 
 def triangle_angles(vertices: Floats, faces: Ints) -> Floats:

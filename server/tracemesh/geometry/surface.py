@@ -3,33 +3,41 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from time import perf_counter
+from typing import Literal
 
-from tracemesh.geometry.biharmonic import BiharmonicSolver
-from tracemesh.geometry.cell_complex import cell_complex
-from tracemesh.geometry.curvature import mean_curvature, normalised
-from tracemesh.geometry.laplacian import Laplacian, cotangent_laplacian, intrinsic_delaunay_laplacian
+import numpy as np
+
+from tracemesh.errors import SurfaceError
+from tracemesh.geometry.cell_complex import CellComplex, cell_complex
+from tracemesh.geometry.curvature import mean_curvature
+from tracemesh.geometry.laplacian import cotangent_laplacian
+from tracemesh.geometry.linear_surface import linear_surface, rebuilt_surface
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
 from tracemesh.geometry.patches import PatchMesh, triangulate_patches
-from tracemesh.geometry.quality import boundary_vertices, mesh_quality
+from tracemesh.geometry.quality import mesh_quality
+from tracemesh.geometry.refinement import refine
 
 Progress = Callable[[str, float], None]
+REBUILDS = 2  # solves in the metric of the last one; more change little
 
 
 @dataclass(frozen=True)
 class SurfaceParameters:
-    """mesh_size: m, edge length inside the patches; None takes the network's own spacing. rebuilds: solves in the
-    metric of the last one.
+    """How to span a surface.
+
+    mesh_size: m, edge length inside the patches; None takes the network's own spacing. refinement: "auto" refines
+    where the network gives evidence for it, "on" always, "off" keeps the linear solution, which is faster.
     """
 
     mesh_size: float | None = None
-    rebuilds: int = 2
+    refinement: Literal["auto", "on", "off"] = "auto"
 
 
 @dataclass(frozen=True)
 class SurfaceResult:
-    """mesh: the surface, the network's points first. report: sizes, quality, stage times (s) and warnings, ready for
-    JSON.
+    """mesh: the surface, the network's points first. report: sizes, quality, stage times (s), warnings, ready
+    for JSON.
     """
 
     mesh: Mesh
@@ -42,45 +50,52 @@ def span_surface(
     """Span a surface over a network.
 
     progress(stage, fraction) is called between stages and may raise Cancelled. Raises NetworkError if the curves do not
-    form a
-    cell complex and SurfaceError if a patch cannot be meshed; both name the segment.
+    form a cell complex and SurfaceError if a patch cannot be meshed; both name the segment.
     """
     parameters = parameters or SurfaceParameters()
     stages = _Stages(progress)
     stages.begin("cycles", 0.0)
     complex_ = cell_complex(network)
-    stages.begin("patches", 0.1)
-    patches = triangulate_patches(network, complex_, parameters.mesh_size)
-    stages.begin("surface", 0.2)
-    vertices, normals = _solve(network, patches, None)
-    for step in range(parameters.rebuilds):
-        stages.begin("rebuild", 0.4 + 0.6 * step / parameters.rebuilds)
-        vertices, normals = _solve(network, patches, vertices)
+    patches, vertices, normals = _linear(network, complex_, parameters, stages)
+    refinement: dict[str, object] = {"mode": parameters.refinement, "used": False}
+    if parameters.refinement != "off":
+        stages.begin("refinement", 0.5)
+        refined = refine(vertices, normals, patches.faces, patches.patch, patches.fixed)
+        refinement["evidence"] = refined.evidence
+        if refined.convincing or parameters.refinement == "on":
+            refinement["used"] = True
+            vertices, normals = refined.vertices, refined.normals
     stages.end()
-    curvature = mean_curvature(vertices, patches.faces, normals)
-    mesh = Mesh(vertices, patches.faces, normals, curvature, patches.patch)
-    warnings = ["no curve was marked as boundary: found it"] if complex_.inferred else []
-    quality = asdict(mesh_quality(vertices, patches.faces, normals))
-    report = {**quality, "patches": len(complex_.faces), "stage_times": stages.times, "warnings": warnings}
-    return SurfaceResult(mesh, report)
+    mesh = Mesh(vertices, patches.faces, normals, mean_curvature(vertices, patches.faces, normals), patches.patch)
+    return SurfaceResult(mesh, _report(mesh, complex_, stages) | {"refinement": refinement})
 
 
-def _solve(network: CurveNetwork, patches: PatchMesh, last: Floats | None) -> tuple[Floats, Floats]:
-    """Vertices and normals of one linear solve, in the metric of the planar patches or of the last solution."""
-    laplacian = _laplacian(patches, last)
-    open_boundary = boundary_vertices(patches.faces, patches.count)
-    solver = BiharmonicSolver(laplacian, patches.fixed, open_boundary)
-    base = solver.solve(network.points)
-    normals = normalised(solver.solve(network.normals))
-    curvature = mean_curvature(base, patches.faces, normals)
-    target = (-2 * curvature * laplacian.mass)[:, None] * normals
-    return solver.solve(network.points, target), normals
+def _linear(
+    network: CurveNetwork, complex_: CellComplex, parameters: SurfaceParameters, stages: "_Stages"
+) -> tuple[PatchMesh, Floats, Floats]:
+    """Patches, vertices and normals: once over projected patches, then over the same unrolled, then rebuilt."""
+    last = None
+    for step in range(2):
+        stages.begin("patches", 0.1 + 0.15 * step)
+        patches = triangulate_patches(network, complex_, parameters.mesh_size, last)
+        stages.begin("surface", 0.15 + 0.15 * step)
+        flat = cotangent_laplacian(patches.planar[patches.planar_faces], patches.faces, patches.count)
+        vertices, normals = linear_surface(flat, patches.faces, network.points, network.normals)
+        last = (patches, vertices)
+    for step in range(REBUILDS):
+        stages.begin("rebuild", 0.35 + 0.15 * step / REBUILDS)
+        vertices, normals = rebuilt_surface(vertices, patches.faces, network.points, network.normals)
+    if not np.isfinite(vertices).all():
+        raise SurfaceError("the surface is not determined by the network: positions are not finite")
+    return patches, vertices, normals
 
 
-def _laplacian(patches: PatchMesh, last: Floats | None) -> Laplacian:
-    if last is None:
-        return cotangent_laplacian(patches.flat, patches.faces, patches.count)
-    return intrinsic_delaunay_laplacian(last, patches.faces)
+def _report(mesh: Mesh, complex_: CellComplex, stages: "_Stages") -> dict[str, object]:
+    quality = mesh_quality(mesh.vertices, mesh.faces, mesh.normals)
+    warnings = ["no curve was marked as boundary: found it from the turning of the curves"] if complex_.inferred else []
+    if quality.inverted_faces:
+        warnings.append(f"{quality.inverted_faces} triangles are turned over: the network may need another curve there")
+    return {**asdict(quality), "patches": len(complex_.faces), "stage_times": stages.times, "warnings": warnings}
 
 
 class _Stages:
