@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
-from tracemesh.formats.recordings import recording_from_simulation
-from tracemesh.geometry.shapes import leaf
-from tracemesh.geometry.simulation import plan_scan, simulate_scan
 from websockets.sync.client import connect
 
 from tests.web.support import PATIENCE, Rider, Server
+from tracemesh.formats.recordings import recording_from_simulation
+from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.simulation import plan_scan, simulate_scan
 
 CHROMIUM = "/usr/bin/chromium"
 FLAGS = (

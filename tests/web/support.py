@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from playwright.sync_api import Locator
+from websockets.sync.client import ClientConnection
+
 from tracemesh.formats.recordings import Recording
 from tracemesh.wire.device import Samples
-from websockets.sync.client import ClientConnection
 
 PATIENCE = 30.0
 """s until a test gives up waiting."""

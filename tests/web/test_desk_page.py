@@ -5,9 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from playwright.sync_api import Locator, Page, expect
-from tracemesh.formats.meshes import read_mesh
 
 from tests.web.support import Rider, Server, share_of_pixels
+from tracemesh.formats.meshes import read_mesh
 
 
 def test_a_ride_is_watched_and_becomes_a_surface(
