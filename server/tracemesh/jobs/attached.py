@@ -1,4 +1,7 @@
-"""The network of a scan under way: whatever hangs together of it, solved over all of its curves at once."""
+"""The network of a scan under way: whatever hangs together of it, solved over all of its curves at once.
+
+The solver is imported where it runs: the server itself stays small and starts at once.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +10,6 @@ import numpy as np
 
 from tracemesh.errors import ScanError
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.reconstruction import reconstruct_network
 from tracemesh.geometry.scan import CurveScan, Floats, Scan
 from tracemesh.storage.curves import curve_rows
 from tracemesh.storage.database import Database
@@ -59,6 +61,8 @@ def largest_piece(curves: Sequence[CurveScan], candidates: Sequence[int]) -> lis
 
 
 def _solve(scan: Scan, indices: Sequence[int]) -> SolvedNetwork | None:
+    from tracemesh.geometry.reconstruction import reconstruct_network
+
     network = reconstruct_network(scan).network
     numbers = np.unique(np.concatenate([curve.node_ids for curve in scan.curves]))
     if len(network.nodes) < len(numbers):

@@ -1,15 +1,21 @@
-"""One attempt at a reconstruction, in whatever process it runs: reads its scan, writes its progress and its results."""
+"""One attempt at a reconstruction, in whatever process it runs: reads its scan, writes its progress and its results.
+
+The kernel is imported where it runs: the server itself stays small and starts at once.
+"""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tracemesh.errors import Cancelled, TracemeshError
-from tracemesh.pipeline import Reconstruction, reconstruct
 from tracemesh.storage.artifacts import ArtifactStore
 from tracemesh.storage.database import Database
 from tracemesh.storage.models import ReconstructionRow
 from tracemesh.storage.reconstructions import finish, report_progress
 from tracemesh.storage.scans import load_scan
 from tracemesh.wire.resources import JobState, ReconstructionParameters
+
+if TYPE_CHECKING:
+    from tracemesh.pipeline import Reconstruction
 
 
 def work(database_url: str, artifact_dir: Path, identifier: str, attempt: int) -> None:
@@ -39,6 +45,8 @@ class _Attempt:
             self._end("failed", "it needs more memory than there is")
 
     def _reconstruct(self) -> None:
+        from tracemesh.pipeline import reconstruct
+
         with self._database.read() as transaction:
             row = transaction.get_one(ReconstructionRow, self._identifier)
             parameters = ReconstructionParameters.model_validate(row.parameters)
@@ -58,6 +66,6 @@ class _Attempt:
             finish(transaction, self._identifier, self._attempt, state, error)
 
 
-def _files(result: Reconstruction) -> dict[str, bytes]:
+def _files(result: "Reconstruction") -> dict[str, bytes]:
     files = {"network.json": result.network_file(), "report.json": result.report_file()}
     return files if result.mesh is None else {**files, "mesh.glb": result.mesh_file()}

@@ -18,7 +18,6 @@ from tracemesh.storage.states import RecordingState
 from tracemesh.wire.device import Recorded, Samples
 from tracemesh.wire.resources import Reconstruction
 
-
 log = logging.getLogger(__name__)
 
 

@@ -43,7 +43,7 @@ class _Connection:
         self._socket = socket
         self._services = services
         self._state: RecordingState | None = None
-        self._acknowledged = -1
+        self._acknowledged: int | None = None
         self._failure: Refused | None = None
         self._wake = asyncio.Event()
 
@@ -103,8 +103,9 @@ class _Connection:
         while self._failure is None:
             await self._wake.wait()
             self._wake.clear()
-            if self._acknowledged >= 0:
-                await self._send(Ack(seq=self._acknowledged))
+            if self._acknowledged is not None:
+                seq, self._acknowledged = self._acknowledged, None
+                await self._send(Ack(seq=seq))
         raise self._failure
 
     async def _receive(self) -> bytes:

@@ -1,0 +1,179 @@
+"""A real server in a thread of the test, and one in a process of its own that can be killed."""
+
+import json
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+from websockets.sync.client import ClientConnection, connect
+
+from tracemesh.api.app import create_app
+from tracemesh.settings import Settings
+
+
+@dataclass
+class RunningServer:
+    """Where a server listens, and how to talk to it."""
+
+    port: int
+    token: str = ""
+    http: httpx.Client = field(init=False)
+
+    def __post_init__(self) -> None:
+        headers = {"Authorization": f"Bearer {self.token}"} if self.token else {}
+        self.http = httpx.Client(base_url=f"http://127.0.0.1:{self.port}/api/v1", headers=headers, timeout=60)
+
+    def connect(self, path: str, **options: Any) -> connect:
+        return connect(f"ws://127.0.0.1:{self.port}/api/v1{path}", max_size=None, compression=None, **options)
+
+    def new_session(self, **body: str) -> str:
+        return str(self.http.post("/sessions", json=body).json()["id"])
+
+
+class Rider:
+    """A device on the ingest socket; `messages` are numbered when they are sent."""
+
+    def __init__(self, socket: ClientConnection, recording: str, session: str | None, **device: Any) -> None:
+        self.socket = socket
+        body = {"id": "rider", "kind": "test", **device}
+        self.hello = json.dumps({"type": "hello", "recording": recording, "session": session, "device": body})
+        self.socket.send(self.hello)
+        self.welcome = self.receive()
+
+    def receive(self) -> dict[str, Any]:
+        answer = json.loads(self.socket.recv(timeout=20))
+        assert isinstance(answer, dict)
+        return answer
+
+    def send(self, message: dict[str, Any]) -> None:
+        self.socket.send(json.dumps(message))
+
+    def wait_for_ack(self, seq: int) -> None:
+        while (answer := self.receive())["type"] == "ack" and answer["seq"] < seq:
+            pass
+        assert answer == {"type": "ack", "seq": seq}
+
+
+def line_messages(samples: int, block: int = 10, curve: int = 0, first_seq: int = 0) -> list[dict[str, Any]]:
+    """A straight ride along x, 1 mm a sample, nodes 0 and 1 at its ends."""
+    messages: list[dict[str, Any]] = [{"type": "curve.start", "curve": curve}]
+    for first in range(0, samples, block):
+        count = min(block, samples - first)
+        columns = {
+            "distance": [0.001 * (first + i) for i in range(count)],
+            "tangent": [[1.0, 0.0, 0.0]] * count,
+            "normal": [[0.0, 0.0, 1.0]] * count,
+        }
+        messages.append({"type": "samples", "curve": curve, "first_sample": first, **columns})
+    messages.append({"type": "node", "curve": curve, "sample": 0, "node": 0})
+    messages.append({"type": "node", "curve": curve, "sample": samples - 1, "node": 1})
+    messages.append({"type": "curve.end", "curve": curve})
+    return [{**m, "seq": first_seq + i} for i, m in enumerate(messages)]
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., RunningServer]]:
+    """Start a server in a thread, with settings of one's own; all are stopped after the module."""
+    running: list[tuple[uvicorn.Server, threading.Thread, RunningServer]] = []
+
+    def start(**options: Any) -> RunningServer:
+        settings = Settings(**{"data_dir": tmp_path_factory.mktemp("data"), "port": free_port(), **options})
+        config = uvicorn.Config(
+            create_app(settings), port=settings.port, log_level="warning", ws="websockets-sansio", lifespan="on"
+        )
+        server = uvicorn.Server(config)
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        while not server.started:
+            assert thread.is_alive(), "the server did not start"
+            time.sleep(0.01)
+        token = settings.token.get_secret_value() if settings.token else ""
+        running.append((server, thread, RunningServer(settings.port, token)))
+        return running[-1][2]
+
+    yield start
+    for server, thread, client in running:
+        client.http.close()
+        server.should_exit = True
+        thread.join()
+
+
+@pytest.fixture(scope="module")
+def server(start_server: Callable[..., RunningServer]) -> RunningServer:
+    """A server with default settings, shared by the tests of a module."""
+    return start_server()
+
+
+@dataclass
+class ServerProcess:
+    """A server that can be killed and started again on the same data."""
+
+    data_dir: Path
+    port: int = field(default_factory=free_port)
+    process: subprocess.Popen[bytes] | None = None
+    client: RunningServer | None = None
+
+    def start(self) -> RunningServer:
+        command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(self.port), "--data-dir", self.data_dir]
+        self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        self._hang_up()
+        client = self.client = RunningServer(self.port)
+        while True:
+            assert self.process.poll() is None, "the server did not start"
+            try:
+                client.http.get(f"http://127.0.0.1:{self.port}/healthz")
+            except httpx.TransportError:
+                time.sleep(0.05)
+            else:
+                return client
+
+    def kill(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+        self._hang_up()
+
+    def _hang_up(self) -> None:
+        if self.client is not None:
+            self.client.http.close()
+
+
+@pytest.fixture
+def server_process(tmp_path: Path) -> Iterator[ServerProcess]:
+    """A server in a process of its own."""
+    process = ServerProcess(tmp_path)
+    yield process
+    process.kill()
+
+
+@pytest.fixture
+def ride(server: RunningServer) -> Iterator[Callable[..., Rider]]:
+    """Connect devices; all hang up after the test."""
+    with ExitStack() as stack:
+
+        def begin(recording: str, session: str | None = None, at: RunningServer | None = None, **device: Any) -> Rider:
+            return Rider(stack.enter_context((at or server).connect("/ingest")), recording, session, **device)
+
+        yield begin
+
+
+@pytest.fixture
+def line() -> Callable[..., list[dict[str, Any]]]:
+    """Messages of a straight ride."""
+    return line_messages

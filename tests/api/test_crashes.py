@@ -1,0 +1,128 @@
+"""kill -9 at the worst moments: what was acknowledged is there afterwards, and the work goes on."""
+
+import json
+import os
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+def test_nothing_acknowledged_is_lost_and_the_device_goes_on(server_process: Any, line: Any) -> None:
+    server = server_process.start()
+    session = server.new_session()
+    messages = [json.dumps(m) for m in line(4000, block=2)]
+    hello = json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "test"}})
+    acknowledged = _send_until_killed(server_process, server, hello, messages)
+    assert 0 <= acknowledged < len(messages) - 1, "the server was killed too late to test anything"
+    server = server_process.start()
+    with server.connect("/ingest") as socket:
+        socket.send(hello)
+        welcome = json.loads(socket.recv(timeout=20))
+        assert welcome["next_seq"] > acknowledged
+        for text in messages[welcome["next_seq"] :]:
+            socket.send(text)
+        while json.loads(socket.recv(timeout=20))["seq"] < len(messages) - 1:
+            pass
+    assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
+    assert server.http.get(f"/sessions/{session}").json()["samples"] == 4000
+
+
+def _send_until_killed(server_process: Any, server: Any, hello: str, messages: list[str]) -> int:
+    """The last acknowledged number when the server dies under a device that never stops sending."""
+    acknowledged = -1
+    with server.connect("/ingest") as socket:
+        socket.send(hello)
+        socket.recv(timeout=20)
+        sender = threading.Thread(target=_send_all, args=(socket, messages))
+        sender.start()
+        try:
+            while True:
+                acknowledged = json.loads(socket.recv(timeout=20))["seq"]
+                if acknowledged > 50:
+                    server_process.kill()
+        except Exception as error:
+            assert "close" in str(error), error
+        sender.join()
+    return acknowledged
+
+
+def _send_all(socket: Any, messages: list[str]) -> None:
+    try:
+        for text in messages:
+            socket.send(text)
+            time.sleep(0.0005)
+    except Exception as error:
+        assert "close" in str(error), error
+
+
+def test_a_job_is_taken_up_after_the_server_was_killed(server_process: Any, shared_data: Path) -> None:
+    server = server_process.start()
+    session = server.new_session()
+    scan = (shared_data / "scans" / "cone-noisy.rawnet").read_bytes()
+    server.http.post(f"/sessions/{session}/recordings", content=scan)
+    job = server.http.post(f"/sessions/{session}/reconstructions").json()["id"]
+    server_process.kill()
+    server = server_process.start()
+    done = _wait(server, job)
+    assert (done["state"], sorted(done["artifacts"])) == ("done", ["mesh.glb", "network.json", "report.json"])
+
+
+def test_workers_end_with_a_killed_server(server_process: Any, shared_data: Path) -> None:
+    server = server_process.start()
+    session = server.new_session()
+    server.http.post(
+        f"/sessions/{session}/recordings", content=(shared_data / "scans" / "cone-noisy.rawnet").read_bytes()
+    )
+    _wait(server, server.http.post(f"/sessions/{session}/reconstructions").json()["id"])
+    workers = _children(server_process.process.pid)
+    assert workers
+    server_process.kill()
+    deadline = time.monotonic() + 20
+    while any(_alive(pid) for pid in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not [pid for pid in workers if _alive(pid)]
+
+
+def test_a_graceful_stop_commits_what_was_accepted(server_process: Any, line: Any) -> None:
+    server = server_process.start()
+    session = server.new_session()
+    messages = [json.dumps(m) for m in line(500)]
+    with server.connect("/ingest") as socket:
+        socket.send(
+            json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "t"}})
+        )
+        socket.recv(timeout=20)
+        for text in messages:
+            socket.send(text)
+        server_process.process.send_signal(signal.SIGTERM)
+        acknowledged = -1
+        with pytest.raises(Exception, match=r"1012|going|close"):
+            while True:
+                acknowledged = json.loads(socket.recv(timeout=20))["seq"]
+    server_process.process.wait(20)
+    server = server_process.start()
+    assert server.http.get(f"/sessions/{session}/recordings/r").text.count("\n") - 2 >= acknowledged
+
+
+def _wait(server: Any, job: str) -> Any:
+    while (state := server.http.get(f"/reconstructions/{job}").json())["state"] in ("queued", "running"):
+        time.sleep(0.05)
+    return state
+
+
+def _children(pid: int) -> list[int]:
+    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=True)
+    return [int(word) for word in found.stdout.split()]
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return "Z" not in Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
