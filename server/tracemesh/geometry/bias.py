@@ -19,6 +19,7 @@ _MOST_MARKS = 150  # that a few variances need to be well known
 _ITERATIONS = 60
 _CHANGE = 0.01  # of every variance in an iteration, at which it ends
 _TRUST = 4.0  # equations' worth of trust in the expected noise
+_GREATEST_ROTATION, _GREATEST_SCALE = 0.5, 0.1  # rad and relative: standard deviations
 _FIRST_ROTATION, _FIRST_SCALE = 0.02, 0.005  # rad and relative: where the iteration starts
 
 
@@ -36,6 +37,12 @@ class Variances:
     segments: float
     normals: float
     evidence: float
+
+    @property
+    def plausible(self) -> bool:
+        """Whether the errors are such as devices have; greater ones speak for wrong node numbers instead."""
+        turn = np.sqrt(np.linalg.eigvalsh(self.rotation)[-1])
+        return bool(turn < _GREATEST_ROTATION and self.scale < _GREATEST_SCALE**2)
 
     @property
     def with_bias(self) -> bool:

@@ -44,11 +44,11 @@ class Closing:
 def close_network(
     curves: Sequence[PlacedCurve], layout: Layout, choice: Choice, step: float, mode: Literal["auto", "on", "off"]
 ) -> Closing:
-    """Errors of whole curves, if `mode` asks for them or the data speak for them, from the smoothed frames of `choice`."""
+    """Errors of whole curves from the smoothed frames of `choice`, if `mode` or the data ask for them."""
     noise = noise_level(curves, choice, step)
     misclosures = Misclosures(layout, choice.frames, noise)
     without, with_bias = estimate_variances(misclosures, _FIRST_SHIFT * step)
     gain = with_bias.evidence - without.evidence
-    variances = with_bias if mode == "on" or (mode == "auto" and gain > 0) else without
+    variances = with_bias if mode == "on" or (mode == "auto" and gain > 0 and with_bias.plausible) else without
     adjustment = Adjustment(misclosures, variances)
     return Closing(variances, adjustment, adjustment.solution(), gain, noise.walk * variances.segments)

@@ -107,7 +107,7 @@ class NetworkReconstruction:
         self._stages.begin("resampling")
         samples = resample(curves, uniform_layout(curves, self._step), self._step)
         self._stages.begin("weighing")
-        self._choice = choose_weights(curves, samples, self._step, _given_weights(self._parameters))
+        self._choice = choose_weights(curves, samples, self._step)
         self._stages.begin("closing")
         self._closing: Closing | None = None
         self._samples = self._close(curves, samples)
@@ -135,15 +135,16 @@ class NetworkReconstruction:
     def solve(self, weights: Weights | None = None) -> NetworkResult:
         """The network, smoothed with the chosen weights or with others; the latter starts from the solution before."""
         layout = self._samples.layout
+        used = weights or _weights(self._parameters, self._choice.weights)
         self._stages.begin("smoothing")
-        regression = self._solver.solve(self._samples.frames, weights or self._choice.weights)
+        regression = self._solver.solve(self._samples.frames, used)
         self._stages.begin("positions")
         positions = self._positions(layout, regression.frames)
         self._stages.begin("uncertainty")
         uncertainty = self._uncertainty(layout, positions, regression.frames)
         network = assemble_network(layout, positions.points, regression.frames, self._indices)
         self._stages.end()
-        report = self._report(network, regression, positions, weights or self._choice.weights, uncertainty)
+        report = self._report(network, regression, positions, used, uncertainty)
         return NetworkResult(network, per_point(layout, regression.frames), per_point(layout, uncertainty), report)
 
     def _uncertainty(self, layout: Layout, positions: Positions, frames: Floats) -> Floats:
@@ -223,11 +224,11 @@ def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> N
             )
 
 
-def _given_weights(parameters: NetworkParameters) -> Weights | None:
+def _weights(parameters: NetworkParameters, automatic: Weights) -> Weights:
     if parameters.weights == "thesis":
         return Weights(1.0, 1.0)
     if parameters.stretch is None and parameters.bend is None:
-        return None
+        return automatic
     return Weights(parameters.stretch or 0.0, parameters.bend or 0.0)
 
 

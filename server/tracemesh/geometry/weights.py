@@ -25,7 +25,6 @@ _RUNS_PER_STEP = 4
 _BENDS = 2.0 ** np.arange(-2, 7)  # trials, in steps
 _LEAST_NOISE = 1e-7  # rad: what eight decimals of a unit vector leave
 _SPLINE_GAIN = 0.265  # 3 sqrt(2) / 16: integral of the squared kernel of a smoothing spline of width 1
-_LEAST_BEND = 0.05  # steps: carries the spline over rows that no sample is near
 _STRETCHES = (0.25, 0.5, 1.0)
 
 
@@ -82,17 +81,14 @@ def _vertex(logs: list[float], errors: list[float]) -> float:
     return float(np.clip(b - slope * (c - a) / 2 / curvature, a, c)) if curvature > 0 else float(b)
 
 
-def choose_weights(
-    curves: Sequence[PlacedCurve], samples: NetworkSamples, step: float, given: Weights | None
-) -> Choice:
-    """Weights that predict left-out frames best; where some are given, only their prediction error is found."""
+def choose_weights(curves: Sequence[PlacedCurve], samples: NetworkSamples, step: float) -> Choice:
+    """Weights that predict left-out frames best."""
     offsets = measured_offsets(curves, samples)
     spline = DevelopedSpline(samples)
     trials = _Trials(spline, offsets, _folds(curves, step))
-    weights = given if given is not None else _search(trials, step)
-    solvable = Weights(weights.stretch, max(weights.bend, _LEAST_BEND * step))
-    smooth = spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(solvable))
-    return Choice(weights, trials.error(solvable), spline.frames(smooth))
+    weights = _search(trials, step)
+    smooth = spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(weights))
+    return Choice(weights, trials.error(weights), spline.frames(smooth))
 
 
 def _search(trials: _Trials, step: float) -> Weights:
