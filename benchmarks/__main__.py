@@ -1,0 +1,49 @@
+"""`python -m benchmarks [TABLE ...]`: measure, print, and keep in docs/benchmarks.md and docs/benchmarks.json."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime
+from time import perf_counter
+
+from benchmarks import accuracy, growth, noisy, regression, surfacing, times
+from benchmarks.data import ROOT, Data
+from benchmarks.machine import machine, revision
+from benchmarks.report import read_report, record, write_report
+from benchmarks.table import Table
+
+TABLES: dict[str, Callable[[Data], Table]] = {
+    "surfacing": surfacing.surfacing,
+    "noisy": noisy.noisy,
+    "uncertainty": noisy.uncertainty,
+    "author": accuracy.author,
+    "steps": accuracy.steps,
+    "weights": accuracy.weights,
+    "surfaces": accuracy.surfaces,
+    "times": times.times,
+    "regression": regression.regression,
+    "growth": growth.growth,
+}
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument(
+        "tables", nargs="*", metavar="TABLE", help=f"one of {', '.join(TABLES)}; all when none is named"
+    )
+    chosen = parser.parse_args(arguments).tables or list(TABLES)
+    if unknown := sorted(set(chosen) - set(TABLES)):
+        parser.error(f"no table {', '.join(unknown)}: there are {', '.join(TABLES)}")
+    data, folder = Data.beside_checkout(), ROOT / "docs"
+    report = read_report(folder / "benchmarks.json", machine())
+    for name in chosen:
+        begin, now = perf_counter(), datetime.now(UTC).date().isoformat()
+        table = TABLES[name](data)
+        print(table.markdown(), flush=True)
+        report["tables"][name] = record(table, now, revision(ROOT), perf_counter() - begin)
+        write_report(folder, report, list(TABLES))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

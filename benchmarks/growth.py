@@ -1,0 +1,99 @@
+"""How time and memory grow with the number of network samples and of mesh vertices, up to a million of each."""
+
+from collections.abc import Callable
+from time import perf_counter
+
+from benchmarks.apart import Measured, apart
+from benchmarks.data import Data, built_in
+from benchmarks.measuring import fitted_exponent
+from benchmarks.table import Cell, Column, Table
+from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.surface import span_surface
+
+SHAPE = "leaf"
+SIZES = (1_000, 10_000, 100_000, 1_000_000)
+BUDGET = 120.0
+"""Seconds that both series together may take; a size that will not fit, judged by the ones before, is left out."""
+
+Work = Callable[[int], tuple[int, float]]
+"""Does the work of a wanted size; returns the size that it had and the seconds that it took."""
+
+
+def growth(data: Data, sizes: tuple[int, ...] = SIZES, budget: float = BUDGET) -> Table:
+    """Table of both series; budget: s for each of them."""
+    del data  # sizes like these come from built-in shapes alone
+    rows = [*_series("network", grow_network, sizes, budget), *_series("surface", grow_surface, sizes, budget)]
+    columns = (
+        Column("from scan to network, from network to surface"),
+        Column("samples, vertices", "d"),
+        Column("time, s", ".3f"),
+        Column("µs each", ".1f"),
+        Column("memory, MiB", ".0f"),
+        Column("KiB each", ".2f"),
+    )
+    note = f"""Default parameters; scan of the built-in {SHAPE}, as many raw samples as network samples. Every size in a
+        new process; imports are not counted, neither in time nor in memory (most that was held at once). Exponent:
+        least-squares fit over the sizes from 10000 on. A size is left out when it would take the series beyond
+        {budget:.0f} s, judged by the sizes before it."""
+    return Table("growth", "Growth of time and memory with size", columns, tuple(rows), (note,))
+
+
+def grow_network(size: int) -> tuple[int, float]:
+    """Reconstruct a network of about so many samples."""
+    shape = built_in(SHAPE)
+    step = sum(curve.length for curve in shape.curves) / size
+    scan = exact_scan(shape, step)
+    begin = perf_counter()
+    network = reconstruct_network(scan, NetworkParameters(step=step)).network
+    return len(network.points), perf_counter() - begin
+
+
+def grow_surface(size: int) -> tuple[int, float]:
+    """Span a surface of about so many vertices over an exact network."""
+    network = built_in(SHAPE).network(_mesh_size(size))
+    begin = perf_counter()
+    mesh = span_surface(network).mesh
+    return len(mesh.vertices), perf_counter() - begin
+
+
+def _mesh_size(size: int) -> float:
+    """Edge length, m, with which a mesh of the shape has about so many vertices."""
+    known, edge = 1000, 0.02
+    return float(edge * (known / size) ** 0.5)
+
+
+def _series(name: str, work: Work, sizes: tuple[int, ...], budget: float) -> list[tuple[Cell, ...]]:
+    """Rows of one series, smallest first, and its exponents."""
+    begin, done = perf_counter(), list[Measured[tuple[int, float]]]()
+    for size in sizes:
+        left = budget - (perf_counter() - begin)
+        if len(done) > 1 and _expected(done, size) > left:
+            break
+        if (measured := apart(left, work, size)) is None:
+            break
+        done.append(measured)
+    rows = [_row(name, measured) for measured in done]
+    rows += [(name, size, f"over {budget:.0f} s", None, None, None) for size in sizes[len(done) :]]
+    return [*rows, _exponents(name, done)]
+
+
+def _expected(done: list[Measured[tuple[int, float]]], size: int) -> float:
+    """Seconds that a size will take if the series goes on as between its last two sizes."""
+    (small, _), (large, _) = (m.result for m in done[-2:])
+    exponent = fitted_exponent([small, large], [m.seconds for m in done[-2:]]) or 1.0
+    return float(done[-1].seconds * (size / large) ** max(exponent, 1.0))
+
+
+def _row(name: str, measured: Measured[tuple[int, float]]) -> tuple[Cell, ...]:
+    (size, seconds), memory = measured.result, measured.memory
+    mib, each = (None, None) if memory is None else (memory / 2**20, memory / 2**10 / size)
+    return (name, size, seconds, 1e6 * seconds / size, mib, each)
+
+
+def _exponents(name: str, done: list[Measured[tuple[int, float]]]) -> tuple[Cell, ...]:
+    large = [m for m in done if m.result[0] > 5_000]
+    sizes = [m.result[0] for m in large]
+    time = fitted_exponent(sizes, [m.result[1] for m in large])
+    memory = fitted_exponent(sizes, [m.memory for m in large if m.memory]) if all(m.memory for m in large) else None
+    return (f"{name}: exponent", None, time, None, None if memory is None else f"{memory:.2f}", None)

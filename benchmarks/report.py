@@ -1,0 +1,67 @@
+"""docs/benchmarks.json and docs/benchmarks.md: the tables of the last run, with the machine at the head."""
+
+import json
+from pathlib import Path
+from typing import TypedDict
+
+from benchmarks.table import Table
+
+
+class Record(TypedDict):
+    """One table as it was measured: when, of which commit, in how many seconds."""
+
+    table: dict[str, object]
+    markdown: str
+    measured: str
+    revision: str
+    seconds: float
+
+
+class Report(TypedDict):
+    machine: dict[str, object]
+    tables: dict[str, Record]
+
+
+HEAD = """# Benchmarks
+
+Written by `make bench` (`python -m benchmarks`; with the names of tables it measures these alone and keeps the others);
+the same figures unrounded are in [benchmarks.json](benchmarks.json). No figure is typed in except published ones, which
+are named as such.
+"""
+
+
+def record(table: Table, measured: str, revision: str, seconds: float) -> Record:
+    return Record(
+        table=table.document(), markdown=table.markdown(), measured=measured, revision=revision, seconds=seconds
+    )
+
+
+def read_report(path: Path, machine: dict[str, object]) -> Report:
+    """The saved report, or an empty one where there is none or it is another machine's: never mixed in one table."""
+    if path.exists():
+        saved: Report = json.loads(path.read_text())
+        if saved["machine"] == machine:
+            return saved
+    return Report(machine=machine, tables={})
+
+
+def write_report(folder: Path, report: Report, order: list[str]) -> None:
+    """Write both files; tables in the given order."""
+    tables = {name: report["tables"][name] for name in order if name in report["tables"]}
+    report = Report(machine=report["machine"], tables=tables)
+    (folder / "benchmarks.json").write_text(json.dumps(report, indent=1) + "\n")
+    (folder / "benchmarks.md").write_text(
+        "\n".join([HEAD, _machine(report["machine"]), *map(_section, tables.values())])
+    )
+
+
+def _machine(machine: dict[str, object]) -> str:
+    packages = machine["packages"]
+    assert isinstance(packages, dict)
+    lines = [f"* {name.replace('_', ' ')}: {value}" for name, value in machine.items() if name != "packages"]
+    return "\n".join([*lines, "* packages: " + ", ".join(f"{name} {v}" for name, v in packages.items())]) + "\n"
+
+
+def _section(entry: Record) -> str:
+    foot = f"Measured {entry['measured']}, commit {entry['revision']}, in {entry['seconds']:.0f} s."
+    return f"{entry['markdown']}\n{foot}\n"

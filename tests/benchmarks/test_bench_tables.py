@@ -1,0 +1,124 @@
+"""Every table of the benchmarks runs on its smallest size, and what is written can be read."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import accuracy, growth, noisy, regression, surfacing, times
+from benchmarks.data import Data
+from benchmarks.report import read_report, record, write_report
+from benchmarks.table import Column, Table
+from benchmarks.thesis_energy import ThesisEnergy
+from tracemesh.geometry.energy import Energy, Stencil
+from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.simulation import exact_scan
+
+WITHOUT = Data(None)
+
+
+def numbers(table: Table, column: int) -> list[float]:
+    return [float(row[column]) for row in table.rows if isinstance(row[column], int | float)]
+
+
+def test_table_renders_aligned_with_absent_figures_and_joined_notes() -> None:
+    table = Table("t", "A title", (Column("a"), Column("b, m", ".2f")), (("x", 1.234), ("yy", None)), ("one\n   two",))
+    assert table.markdown().splitlines() == [
+        "## A title",
+        "",
+        "| a  | b, m |",
+        "| -- | ---: |",
+        "| x  | 1.23 |",
+        "| yy |    – |",
+        "",
+        "one two",
+    ]
+    assert table.document()["rows"] == [["x", 1.234], ["yy", None]]
+
+
+def test_row_of_another_length_is_refused() -> None:
+    with pytest.raises(ValueError, match="wanted 1 cells a row, got 2"):
+        Table("t", "", (Column("a"),), (("x", 1),))
+
+
+def test_report_keeps_other_tables_of_the_same_machine_only(tmp_path: Path) -> None:
+    table = Table("one", "First", (Column("a"),), (("x",),))
+    machine: dict[str, object] = {"processor": "p", "packages": {"numpy": "2"}}
+    report = read_report(tmp_path / "benchmarks.json", machine)
+    report["tables"]["one"] = record(table, "2026-01-01", "abc", 1.0)
+    write_report(tmp_path, report, ["two", "one"])
+    assert "## First" in (tmp_path / "benchmarks.md").read_text()
+    assert json.loads((tmp_path / "benchmarks.json").read_text())["tables"]["one"]["table"]["rows"] == [["x"]]
+    assert list(read_report(tmp_path / "benchmarks.json", machine)["tables"]) == ["one"]
+    assert read_report(tmp_path / "benchmarks.json", {**machine, "processor": "q"})["tables"] == {}
+
+
+def test_surfacing(shared_data: Path) -> None:
+    table = surfacing.surfacing(Data(shared_data), ("field-4",))
+    (row,) = table.rows
+    biharmonic, _, thesis = row[1:4]
+    assert biharmonic == pytest.approx(0.120, abs=0.005)  # published: .120 and .074
+    assert thesis == pytest.approx(0.074, abs=0.01)
+    assert row[0] == "field-4"
+    assert surfacing.surfacing(WITHOUT).rows == ()
+
+
+def test_steps_and_author(shared_data: Path) -> None:
+    table = accuracy.steps(WITHOUT, ("leaf",), (6.4, 1.6))
+    coarse, fine, order = (float(table.rows[0][k] or 0) for k in (1, 2, 3))
+    assert fine < coarse / 4
+    assert order == pytest.approx(np.log(coarse / fine) / np.log(4))
+    assert numbers(accuracy.author(Data(shared_data), (6.4,)), 2)[0] < 0.002
+    assert accuracy.author(WITHOUT).rows == ()
+
+
+def test_weights_and_surfaces() -> None:
+    assert len(accuracy.weights(WITHOUT, ("leaf",), (6.4,)).rows) == len(accuracy.SCHEMES)
+    errors = numbers(accuracy.surfaces(WITHOUT, ("leaf",), (6.4,)), 2)
+    assert len(errors) == len(accuracy.SCHEMES)
+    assert 0 < min(errors) < 1
+
+
+def test_noisy_and_uncertainty() -> None:
+    assert 0 < numbers(noisy.noisy(WITHOUT, ("leaf",)), 2)[0] < 0.5
+    assert 0.2 < numbers(noisy.uncertainty(WITHOUT, ("leaf",), 1), 1)[0] < 5
+
+
+def test_partners_of_an_exact_network_are_its_points() -> None:
+    network = leaf().network(0.02)
+    assert noisy.partners(network, leaf().network(0.002)) == pytest.approx(network.points, abs=2e-5)
+
+
+def test_times_and_regression() -> None:
+    (row,) = times.times(WITHOUT, (96,), 1).rows
+    assert 48 < int(row[2] or 0) < 192
+    assert all(isinstance(cell, float) and cell > 0 for cell in row[3:7])
+    (row,) = regression.regression(WITHOUT, (96,), 1).rows
+    assert float(row[3] or 0) > 0
+    assert row[6] == "not installed" or abs(float(row[7] or 1)) < 1e-6
+
+
+def test_growth_fits_and_leaves_out_what_takes_too_long() -> None:
+    table = growth.growth(WITHOUT, (300, 600), 60.0)
+    assert [row[0] for row in table.rows] == ["network"] * 2 + ["network: exponent"] + ["surface"] * 2 + [
+        "surface: exponent"
+    ]
+    assert [row[2] for row in growth.growth(WITHOUT, (300,), 0.0).rows[:1]] == ["over 0 s"]
+
+
+def test_plain_energy_is_the_solvers_and_has_its_gradient_and_hessian() -> None:
+    samples = regression.regression_problem(exact_scan(leaf(), 0.01), 0.08)
+    stencil = Stencil(samples.layout)
+    data = samples.frames[stencil.representative]
+    weights = regression.thesis_weights(1, 100, 0.08)
+    energy = ThesisEnergy(stencil, data, weights)
+    generator = np.random.default_rng(1)
+    frames, change = data + 0.1 * generator.normal(size=data.shape), generator.normal(size=data.shape)
+    assert energy.cost(data) == pytest.approx(Energy(stencil).value(data, data, weights))
+    step = 1e-5
+    ahead, behind = frames + step * change, frames - step * change
+    slope = (energy.cost(ahead) - energy.cost(behind)) / (2 * step)
+    assert np.sum(energy.gradient(frames) * change) == pytest.approx(slope, rel=1e-6)
+    bend = (energy.gradient(ahead) - energy.gradient(behind)) / (2 * step)
+    assert energy.hessian(frames, change) == pytest.approx(bend, rel=1e-5, abs=1e-5 * np.abs(bend).max())
