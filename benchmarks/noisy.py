@@ -67,7 +67,7 @@ def normalised_errors(known: KnownScan) -> Floats:
 
 
 def partners(network: CurveNetwork, truth: CurveNetwork) -> Floats:
-    """Where points (n, 3) that are evenly spaced along each segment of a network lie on the same segment of the truth."""
+    """Where points (n, 3) that are evenly spaced along each segment of a network lie on the truth's segments."""
     result = np.empty_like(network.points)
     for found, known in zip(network.segments, truth.segments, strict=True):
         points = truth.points[known.points]
