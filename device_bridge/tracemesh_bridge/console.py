@@ -21,19 +21,22 @@ class Console:
     def say(self, words: str) -> None:
         """One line that stays."""
         clear = "\r\x1b[K" if self._status else ""
-        print(f"{clear}{words}", file=sys.stderr, flush=True)
-        self._show()
+        _write(f"{clear}{words}\n{self._line()}")
 
     def status(self, words: str) -> None:
         """Rewrite the last line; nothing without a terminal."""
         if self._terminal:
             self._status = words
-            self._show()
+            _write(f"\r\x1b[K{self._line()}")
 
-    def _show(self) -> None:
-        if self._status:
-            width = os.get_terminal_size(sys.stderr.fileno()).columns - 1
-            print(f"\r\x1b[K{self._status[:width]}", end="", file=sys.stderr, flush=True)
+    def _line(self) -> str:
+        return self._status[: os.get_terminal_size(sys.stderr.fileno()).columns - 1] if self._status else ""
+
+
+def _write(text: str) -> None:
+    """All at once: several threads have something to say."""
+    sys.stderr.write(text)
+    sys.stderr.flush()
 
 
 @contextmanager

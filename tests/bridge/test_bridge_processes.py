@@ -54,7 +54,7 @@ def test_what_the_device_sent_is_stored(bench):
 
 def test_the_virtual_operator_scans_a_whole_shape(bench):
     device = bench.virtual("--shape", "cone", "--speed", "6")
-    bridge = bench.bridge("--rate", "5000")
+    bridge = bench.bridge("--rate", "200")
     typed = 0
     while "quitting" not in bridge.said:
         typed += bridge.type(device.keys[typed:].decode())

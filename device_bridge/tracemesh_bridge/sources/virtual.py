@@ -15,6 +15,8 @@ from typing import Literal
 
 FAULTS = ("short", "garbage", "silent", "late", "surplus", "duplicate")
 LATE_BY = 0.4
+PATIENCE = 1.0
+"""s without a request after which a device whose ride is over leaves."""
 
 
 @dataclass(frozen=True)
@@ -39,19 +41,21 @@ class VirtualSettings:
 
 
 def run_virtual(settings: VirtualSettings) -> None:
-    """Be the device until the ride is over. Raises BridgeError if there is no such shape."""
+    """Be the device until the ride is over and nobody asks any more. Raises BridgeError if there is no such shape."""
     from tracemesh_bridge.sources.ride import Ride  # late: it needs much that no other command does
 
     ride = Ride(settings)
     with _Port(settings.link) as port:
         say(f"virtual Morphorider ({settings.shape}, {ride.duration:.0f} s) at {port.name}")
         while not ride.over:
-            ride.press_keys()
             if port.request(ride.patience):
                 port.write(ride.answer())
                 if ride.requests == settings.unplug:
                     port.replug()
                     say(f"unplugged and back at {port.name}")
+            ride.press_keys()
+        while port.request(PATIENCE):  # the ride is over, but a device does not vanish before it is let go
+            port.write(ride.answer())
 
 
 class _Port:

@@ -1,0 +1,1 @@
+"""The commands of tracemesh-bridge: options in, what they run out."""
