@@ -102,12 +102,11 @@ class Samples(Message):
     @property
     def count(self) -> int:
         """Number of samples in the block."""
-        return max((len(v) for v in self.columns().values()), default=0)
+        return next((len(v) for n in _COLUMNS if (v := getattr(self, n)) is not None), 0)
 
     def columns(self) -> dict[str, list[object]]:
         """The columns that are present, by name."""
-        names = set(type(self).model_fields) - {"type", "seq", "curve", "first_sample"}
-        return {n: v for n in type(self).model_fields if n in names and (v := getattr(self, n)) is not None}
+        return {n: v for n in _COLUMNS if (v := getattr(self, n)) is not None}
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -122,6 +121,9 @@ class Samples(Message):
                 f"got only {', '.join(lengths)}"
             )
         return self
+
+
+_COLUMNS = tuple(name for name in Samples.model_fields if name not in ("type", "seq", "curve", "first_sample"))
 
 
 class NodeMark(Message):
