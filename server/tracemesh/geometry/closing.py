@@ -23,7 +23,7 @@ _FIRST_SHIFT = 0.05  # steps: a first guess at the deviation of node marks
 class Closing:
     """How a network closes. gain: logarithm of how much likelier errors of whole curves make it, penalised.
 
-    walk: (c,) m, variance per metre and axis of each curve's positions.
+    walk: (c,) m, variance per metre and axis of each curve's positions. drift: relative to a segment's length.
     """
 
     variances: Variances
@@ -31,13 +31,15 @@ class Closing:
     corrections: Corrections
     gain: float
     walk: Floats
+    drift: float
 
     def noise_factor(self, layout: Layout, gaps: Floats) -> float:
         """Ratio, at least 1, of the noise that the gaps (s, 3), m, of final positions show to the one expected."""
         loops = len(gaps) - layout.node_count + 1
         if not loops:
             return 1.0
-        expected = self.walk[layout.segment_curve] * layout.segment_lengths
+        length = layout.segment_lengths
+        expected = self.walk[layout.segment_curve] * length + self.variances.segments * (self.drift * length) ** 2
         return float(max(1.0, np.sqrt(np.sum(np.sum(gaps**2, axis=1) / expected) / (3 * loops))))
 
 
@@ -51,4 +53,4 @@ def close_network(
     gain = with_bias.evidence - without.evidence
     variances = with_bias if mode == "on" or (mode == "auto" and gain > 0 and with_bias.plausible) else without
     adjustment = Adjustment(misclosures, variances)
-    return Closing(variances, adjustment, adjustment.solution(), gain, noise.walk * variances.segments)
+    return Closing(variances, adjustment, adjustment.solution(), gain, noise.walk * variances.segments, noise.drift)

@@ -29,13 +29,14 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """Expected random errors. walk: (c,) m, variance per metre travelled of a curve's positions, per axis.
-
-    normal: (c,) rad, standard deviation of a smoothed normal, per axis.
+    """Expected errors that no curve has as a whole. walk: (c,) m, variance per metre travelled of a curve's positions,
+    per axis. normal: (c,) rad, standard deviation of a smoothed normal, per axis. drift: relative to a segment's
+    length, what no device does better.
     """
 
     walk: Floats
     normal: Floats
+    drift: float
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,8 @@ class Misclosures:
         edges = edge_vectors(layout, self._frames)
         vectors, gaps = segment_vectors(layout, edges), solve_positions(layout, edges).gaps
         curve, start = layout.segment_curve, layout.segments
-        weight = 1 / np.sqrt(noise.walk[curve] * layout.segment_lengths)
+        length = layout.segment_lengths
+        weight = 1 / np.sqrt(noise.walk[curve] * length + (noise.drift * length) ** 2)
         tangent = self._frames[layout.marks, :, 0]
         row = 3 * np.arange(len(start))[:, None] + np.arange(3)
         rotation, scale = self._columns(curve)

@@ -13,15 +13,9 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from tracemesh.geometry.energy import Weights
+from tracemesh.geometry.interpolation import interpolate
 from tracemesh.geometry.placement import PlacedCurve
-from tracemesh.geometry.rotations import (
-    align_signs,
-    exp,
-    log,
-    matrix_to_quaternion,
-    normalized,
-    quaternion_difference,
-)
+from tracemesh.geometry.rotations import exp, log, matrix_to_quaternion, quaternion_difference
 from tracemesh.geometry.samples import NetworkSamples
 
 Floats = NDArray[np.float64]
@@ -33,14 +27,13 @@ class Offsets:
     """Measured frames as rotation vectors from the resampled frames interpolated where they were measured.
 
     value: (m, 3) rad, world. row: (m,) layout row before each; fraction: (m,) of the way to the next row.
-    weight: (m,) m, length of curve that the sample stands for. start: (c + 1,) first sample of each curve.
+    weight: (m,) m, length of curve that the sample stands for.
     """
 
     value: Floats
     row: Ints
     fraction: Floats
     weight: Floats
-    start: Ints
 
     def predicted(self, offset: Floats) -> Floats:
         """Offsets (n, 3) at rows, interpolated at the measured samples (m, 3)."""
@@ -51,21 +44,17 @@ class Offsets:
 
 def measured_offsets(curves: Sequence[PlacedCurve], samples: NetworkSamples) -> Offsets:
     """Offsets of everything measured between the ends of a layout's curves."""
-    layout = samples.layout
-    rows, fractions, weights, quaternions = [], [], [], []
-    for curve, first, last in zip(curves, layout.first[:-1], layout.first[1:] - 1, strict=True):
-        arc = layout.arc[first : last + 1]
-        cell = np.clip(np.searchsorted(arc, curve.arc, side="right") - 1, 0, len(arc) - 2)
-        rows.append(first + cell)
-        fractions.append((curve.arc - arc[cell]) / (arc[cell + 1] - arc[cell]))
-        weights.append(np.gradient(curve.arc))
-        quaternions.append(curve.quaternion)
-    row, fraction = np.concatenate(rows), np.concatenate(fractions)
-    grid = align_signs(matrix_to_quaternion(samples.frames))
-    between = normalized((1 - fraction[:, None]) * grid[row] + fraction[:, None] * grid[row + 1])
-    start = np.concatenate([[0], np.cumsum([len(r) for r in rows])])
-    value = quaternion_difference(np.concatenate(quaternions), between)
-    return Offsets(value, row, fraction, np.concatenate(weights), start)
+    layout, places, rows = samples.layout, [c.arc for c in curves], []
+    for place, first, last in zip(places, layout.first[:-1], layout.first[1:] - 1, strict=True):
+        inner = np.searchsorted(layout.arc[first + 1 : last], place, side="right")
+        rows.append(first + inner)
+    row, place = np.concatenate(rows), np.concatenate(places)
+    edge = row - layout.curve[row]  # every curve before has one edge less than rows
+    between = interpolate(layout, samples.frames.reshape(-1, 9), edge, place).reshape(-1, 3, 3)
+    value = quaternion_difference(np.concatenate([c.quaternion for c in curves]), matrix_to_quaternion(between))
+    fraction = (place - layout.arc[row]) / layout.lengths[edge]
+    weight = np.concatenate([np.gradient(p) for p in places])
+    return Offsets(value, row, fraction, weight)
 
 
 class DevelopedSpline:

@@ -23,7 +23,7 @@ Bands = tuple[Floats, Floats]
 _FOLDS = 5
 _RUNS_PER_STEP = 4
 _BENDS = 2.0 ** np.arange(-2, 7)  # trials, in steps
-_LEAST_NOISE = 1e-7  # rad: what eight decimals of a unit vector leave
+_LEAST_TILT, _LEAST_DRIFT = 1e-3, 1e-4  # rad and relative: what no device does better, were its data free of noise
 _SPLINE_GAIN = 0.265  # 3 sqrt(2) / 16: integral of the squared kernel of a smoothing spline of width 1
 _STRETCHES = (0.25, 0.5, 1.0)
 
@@ -103,8 +103,11 @@ def _search(trials: _Trials, step: float) -> Weights:
 
 
 def noise_level(curves: Sequence[PlacedCurve], choice: Choice, step: float) -> NoiseLevel:
-    """Expected random errors of positions and smoothed normals along curves whose frames have independent errors."""
+    """Expected random errors of positions and smoothed normals along curves whose frames have independent errors.
+
+    Of a frame's errors about three axes two turn the tangent.
+    """
     spacing = np.array([c.length / (len(c.arc) - 1) for c in curves])
-    walk = np.maximum(choice.noise, _LEAST_NOISE) ** 2 * spacing
+    density = choice.noise**2 * spacing
     width = max(choice.weights.bend, choice.weights.stretch, step)
-    return NoiseLevel(walk, np.sqrt(_SPLINE_GAIN * walk / width))
+    return NoiseLevel(density * 2 / 3, np.sqrt(_SPLINE_GAIN * density / width + _LEAST_TILT**2), _LEAST_DRIFT)
