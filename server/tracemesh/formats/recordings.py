@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from tracemesh.errors import InputError, ScanError
+from tracemesh.geometry.closed_curves import from_first_node
 from tracemesh.geometry.odometry import distance_from_ticks, distance_from_time
 from tracemesh.geometry.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
 from tracemesh.geometry.rotations import quaternion_to_matrix
@@ -220,7 +221,7 @@ def _curve(raw: _RawCurve, device: Device) -> CurveScan:
         distance, tangent, normal, samples, ids, raw.boundary, raw.closed,
         columns.get("acceleration"), columns.get("magnetic"), columns.get("time"),
     )  # fmt: skip
-    return _closed(scan) if raw.closed else scan
+    return from_first_node(scan) if raw.closed else scan
 
 
 def _joined(blocks: Sequence[Samples]) -> dict[str, Floats]:
@@ -273,23 +274,3 @@ def _distance(columns: dict[str, Floats], device: Device, tangent: Floats, norma
             columns["time"], np.stack([tangent, normal, np.cross(tangent, normal)], axis=2), marks
         )
     raise InputError("wanted ticks, distance or time in all its blocks, got none of them")
-
-
-def _closed(scan: CurveScan) -> CurveScan:
-    """A closed curve that goes from its first node around to the same node, wherever it was begun."""
-    if len(scan.node_ids) == 0 or (len(scan.node_ids) > 1 and scan.node_ids[0] == scan.node_ids[-1]):
-        return scan
-    start, count = int(scan.node_samples[0]), len(scan.distance)
-    order = np.concatenate([np.arange(start, count), np.arange(1, start + 1)])
-    lap = np.where(np.arange(count) < count - start, 0.0, scan.distance[-1] - scan.distance[0])
-    optional = (scan.acceleration, scan.magnetic, scan.time)
-    return CurveScan(
-        scan.distance[order] + lap,
-        scan.tangent[order],
-        scan.normal[order],
-        np.append(scan.node_samples - start, count - 1),
-        np.append(scan.node_ids, scan.node_ids[0]),
-        scan.boundary,
-        True,
-        *(None if column is None else column[order] for column in optional),
-    )

@@ -1,0 +1,31 @@
+"""Closed curves that begin and end at a node."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracemesh.geometry.scan import CurveScan
+
+
+def from_first_node(curve: CurveScan) -> CurveScan:
+    """A closed curve that goes from its first node around to the same node, wherever its measurement began.
+
+    One that does so already, or has no node, is returned as it is.
+    """
+    ids = curve.node_ids
+    if len(ids) == 0 or (len(ids) > 1 and ids[0] == ids[-1]):
+        return curve
+    start, count = int(curve.node_samples[0]), len(curve.distance)
+    order = np.concatenate([np.arange(start, count), np.arange(1, start + 1)])
+    lap = np.where(np.arange(count) < count - start, 0.0, curve.distance[-1] - curve.distance[0])
+    return replace(
+        curve,
+        distance=curve.distance[order] + lap,
+        tangent=curve.tangent[order],
+        normal=curve.normal[order],
+        node_samples=np.append(curve.node_samples - start, count - 1),
+        node_ids=np.append(ids, ids[0]),
+        acceleration=None if curve.acceleration is None else curve.acceleration[order],
+        magnetic=None if curve.magnetic is None else curve.magnetic[order],
+        time=None if curve.time is None else curve.time[order],
+    )

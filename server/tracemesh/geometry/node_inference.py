@@ -1,0 +1,220 @@
+"""Nodes of a scan in which they were not marked, with a confidence for each (the thesis's open problem).
+
+Curves are placed one after the other, beginning with a closed one or with those that marked nodes hold together: open
+curves by their ends, closed ones by votes. Then curves cross where they come near each other with the same normal, and
+one joint solution corrects all places.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tracemesh.errors import ScanError
+from tracemesh.geometry.attachment import attach, table_of
+from tracemesh.geometry.closed_curves import from_first_node
+from tracemesh.geometry.contacts import Contact, settle
+from tracemesh.geometry.crossings import crossing_odds, find_crossings
+from tracemesh.geometry.floating import FloatingCurve, Pose, float_curves
+from tracemesh.geometry.loops import place_loop
+from tracemesh.geometry.scan import CurveScan, Scan
+
+_SURE = 0.95
+_LIKELY = 0.5
+_APART = 0.03
+"""m along both curves; nearer crossings of the same two curves are one."""
+_SAME = 0.005
+"""m along a curve; contacts nearer than this cannot be told apart: one node."""
+_ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class NodeProposal:
+    """One node. places: (curve, sample) on each of its curves, both counted from 0. confidence: 0 to 1.
+
+    node: its number if it was marked before, else None.
+    """
+
+    places: tuple[tuple[int, int], ...]
+    confidence: float
+    node: int | None = None
+
+
+@dataclass(frozen=True)
+class InferredNodes:
+    """proposals: nodes that were found, those already marked among them. unplaced: curves (from 0) for which no place
+    was found, so that nothing is said about their nodes.
+    """
+
+    proposals: tuple[NodeProposal, ...]
+    unplaced: tuple[int, ...]
+
+
+def infer_nodes(scan: Scan) -> InferredNodes:
+    """Nodes of a scan, marked or not.
+
+    Raises ScanError when a curve cannot be used, or when there is no closed curve and no marked node to begin with.
+    """
+    curves = float_curves(scan)
+    search = _Search(scan, curves)
+    while search.attach_open() or search.place_a_loop():
+        search.settle_and_cross()
+    search.settle_and_cross()
+    unplaced = tuple(i for i in range(len(curves)) if i not in search.poses)
+    return InferredNodes(_proposals(scan, curves, search.contacts), unplaced)
+
+
+def mark_nodes(scan: Scan, proposals: Sequence[NodeProposal]) -> Scan:
+    """The scan with these nodes marked instead of its own; those without a number get the next free ones."""
+    free = 1 + max((p.node for p in proposals if p.node is not None), default=-1)
+    marks: list[list[tuple[int, int]]] = [[] for _ in scan.curves]
+    for proposal in proposals:
+        node = proposal.node
+        if node is None:
+            node, free = free, free + 1
+        for curve, sample in proposal.places:
+            marks[curve].append((sample, node))
+    return Scan(tuple(_marked(curve, sorted(m)) for curve, m in zip(scan.curves, marks, strict=True)))
+
+
+class _Search:
+    """What is placed so far."""
+
+    def __init__(self, scan: Scan, curves: Sequence[FloatingCurve]) -> None:
+        self._curves = curves
+        self._marked = _marked_contacts(scan, curves)
+        self.contacts: list[Contact] = []
+        start = _start(scan, curves)
+        self.poses: dict[int, Pose] = {start: Pose(0.0, np.zeros(3))}
+        self._follow_marks()
+
+    def _follow_marks(self) -> None:
+        """Place what marked nodes hold to placed curves."""
+        waiting = [c for c in self._marked if c not in self.contacts]
+        while ready := [c for c in waiting if c.a in self.poses or c.b in self.poses]:
+            for contact in ready:
+                for here, there, s, t in (
+                    (contact.a, contact.b, contact.s, contact.t),
+                    (contact.b, contact.a, contact.t, contact.s),
+                ):
+                    if here in self.poses and there not in self.poses:
+                        pose = self.poses[here]
+                        place = pose.rotation @ self._curves[here].position(s) + pose.shift
+                        self.poses[there] = Pose(0.0, place - self._curves[there].position(t))
+                self.contacts.append(contact)
+            waiting = [c for c in waiting if c not in ready]
+
+    def attach_open(self) -> bool:
+        """Attach the open curves whose ends are sure, or else the likeliest; says whether any was placed."""
+        places = table_of(self._curves, self.poses)
+        loose = [i for i, c in enumerate(self._curves) if not c.closed and i not in self.poses]
+        found = [(i, a) for i in loose if (a := attach(self._curves[i], places)) is not None]
+        found.sort(key=lambda f: -f[1].confidence)
+        chosen = [f for k, f in enumerate(found) if f[1].confidence > (_LIKELY if k == 0 else _SURE)]
+        for i, attachment in chosen:
+            self.poses[i] = attachment.pose
+            for end, row in ((0.0, attachment.first), (self._curves[i].length, attachment.last)):
+                on, at = int(places.curve[row]), float(places.arc[row])
+                self.contacts.append(Contact(i, end, on, at, attachment.confidence, known_s=True))
+        self._follow_marks()
+        return bool(chosen)
+
+    def place_a_loop(self) -> bool:
+        """Place the closed curve with the strongest evidence; says whether there was one."""
+        loose = [c for i, c in enumerate(self._curves) if not c.closed and i not in self.poses]
+        loops = [i for i, c in enumerate(self._curves) if c.closed and i not in self.poses]
+        found = [(i, p) for i in loops if (p := place_loop(self._curves[i], self._curves, self.poses, loose))]
+        if not found:
+            return False
+        index, best = max(found, key=lambda f: f[1].evidence)
+        self.poses[index] = best.pose
+        self._follow_marks()
+        return True
+
+    def settle_and_cross(self) -> None:
+        """Improve all places, find crossings, and improve again."""
+        for _ in range(_ROUNDS):
+            self._add_crossings()
+            if self.contacts:
+                settled = settle(self._curves, self.poses, self.contacts)
+                self.poses, self.contacts = settled.poses, list(settled.contacts)
+
+    def _add_crossings(self) -> None:
+        placed = sorted(self.poses)
+        for k, a in enumerate(placed):
+            for b in placed[k + 1 :]:
+                for found in find_crossings(self._curves[a], self.poses[a], self._curves[b], self.poses[b]):
+                    odds = crossing_odds(found)
+                    contact = Contact(a, found.s, b, found.t, odds / (1 + odds))
+                    if odds > 1 and not any(self._is_same(contact, c) for c in self.contacts):
+                        self.contacts.append(contact)
+
+    def _is_same(self, one: Contact, other: Contact) -> bool:
+        if (one.a, one.b) == (other.b, other.a):
+            other = replace(other, a=other.b, s=other.t, b=other.a, t=other.s)
+        near_s = abs(self._curves[one.a].apart(one.s, other.s)) < _APART
+        near_t = abs(self._curves[one.b].apart(one.t, other.t)) < _APART
+        return (one.a, one.b) == (other.a, other.b) and bool(near_s and near_t)
+
+
+def _start(scan: Scan, curves: Sequence[FloatingCurve]) -> int:
+    """A closed boundary, or any closed curve, or one with marks; the longest of its kind."""
+    kinds = (lambda c: c.closed and c.boundary, lambda c: c.closed, lambda c: len(c.node_ids) > 0)
+    for kind in kinds:
+        fitting = [i for i, c in enumerate(scan.curves) if kind(c)]
+        if fitting:
+            return max(fitting, key=lambda i: curves[i].length)
+    raise ScanError("nodes can only be found beginning with a closed curve or a marked node: the scan has neither")
+
+
+def _marked_contacts(scan: Scan, curves: Sequence[FloatingCurve]) -> list[Contact]:
+    """Nodes that are marked on several curves, each as contacts with the first of them."""
+    first: dict[int, tuple[int, float]] = {}
+    contacts = []
+    for index, (scanned, curve) in enumerate(zip(scan.curves, curves, strict=True)):
+        for sample, node in zip(scanned.node_samples, scanned.node_ids, strict=True):
+            arc = float(np.clip(scanned.distance[sample] - curve.start, 0.0, curve.length))
+            if int(node) not in first:
+                first[int(node)] = index, arc
+            elif first[int(node)][0] != index:
+                other, at = first[int(node)]
+                contacts.append(Contact(other, at, index, arc, 1.0, known_s=True, known_t=True, node=int(node)))
+    return contacts
+
+
+def _proposals(scan: Scan, curves: Sequence[FloatingCurve], contacts: Sequence[Contact]) -> tuple[NodeProposal, ...]:
+    """Contacts that share a place on a curve are one node."""
+    groups: list[list[Contact]] = []
+    for contact in contacts:
+        touching = [g for g in groups if any(_share_a_place(contact, c, curves) for c in g)]
+        merged = [contact, *(c for g in touching for c in g)]
+        groups = [g for g in groups if g not in touching] + [merged]
+    proposals = [_proposal(scan, curves, group) for group in groups]
+    return tuple(sorted(proposals, key=lambda p: p.places))
+
+
+def _share_a_place(one: Contact, other: Contact, curves: Sequence[FloatingCurve]) -> bool:
+    return any(
+        i == j and abs(curves[i].apart(s, t)) < _SAME
+        for i, s in ((one.a, one.s), (one.b, one.t))
+        for j, t in ((other.a, other.s), (other.b, other.t))
+    )
+
+
+def _proposal(scan: Scan, curves: Sequence[FloatingCurve], group: Sequence[Contact]) -> NodeProposal:
+    arcs: dict[int, list[float]] = {}
+    for contact in group:
+        arcs.setdefault(contact.a, []).append(contact.s)
+        arcs.setdefault(contact.b, []).append(contact.t)
+    places = []
+    for i, found in sorted(arcs.items()):
+        middle = found[0] + float(np.mean(curves[i].apart(np.array(found), found[0])))
+        places.append((i, int(np.abs(scan.curves[i].distance - curves[i].start - middle).argmin())))
+    numbers = [c.node for c in group if c.node is not None]
+    return NodeProposal(tuple(places), min(c.confidence for c in group), min(numbers, default=None))
+
+
+def _marked(curve: CurveScan, marks: Sequence[tuple[int, int]]) -> CurveScan:
+    table = np.array(marks, np.int64).reshape(-1, 2)
+    marked = replace(curve, node_samples=table[:, 0].copy(), node_ids=table[:, 1].copy())
+    return from_first_node(marked) if curve.closed else marked
