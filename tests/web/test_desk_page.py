@@ -8,6 +8,9 @@ from playwright.sync_api import Locator, Page, expect
 
 from tests.web.support import Rider, Server, share_of_pixels
 from tracemesh.formats.meshes import read_mesh
+from tracemesh.formats.rawnet import write_rawnet
+from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.simulation import exact_scan
 
 
 def test_a_ride_is_watched_and_becomes_a_surface(
@@ -104,6 +107,49 @@ def test_sessions_are_renamed_and_deleted_with_undo(server: Server, page: Page) 
     names = {session["name"] for session in server.call("GET", "/sessions")}
     assert "Jug" in names
     assert "Bowl" not in names
+
+
+def test_a_file_is_opened_edited_and_reconstructed_with_other_parameters(
+    server: Server, page: Page, tmp_path: Path
+) -> None:
+    scan = tmp_path / "leaf.rawnet"
+    scan.write_text(write_rawnet(exact_scan(leaf(), 0.01)))
+    page.goto(server.page())
+    page.locator("input[type=file]").set_input_files(scan)
+    curves = page.get_by_role("complementary", name="Curves and nodes")
+    expect(curves.get_by_role("button", name="interior")).to_have_count(4)
+    expect(page.get_by_label("Name of the session")).to_have_value("leaf")
+    session = page.url.rsplit("/", 1)[1]
+
+    curves.get_by_role("button", name="3 interior").click()
+    curves.get_by_role("button", name="Remove").click()
+    expect(curves.get_by_role("button", name="interior")).to_have_count(3)
+    curves.get_by_role("button", name="Undo").click()
+    expect(curves.get_by_role("button", name="interior")).to_have_count(4)
+
+    page.get_by_role("button", name="Reconstruct").click()
+    view = page.locator("canvas")
+    expect(view).to_have_attribute("data-surface", "shown")
+    coarse = int(view.get_attribute("data-triangles") or 0)
+    page.get_by_text("Parameters").click()
+    page.get_by_role("slider", name="Step").fill("0.3")
+    expect(page.get_by_text("Parameters (changed)")).to_be_visible()
+    expect(view).not_to_have_attribute("data-triangles", str(coarse))
+    expect(view).to_have_attribute("data-surface", "shown")
+    assert int(view.get_attribute("data-triangles") or 0) > coarse
+    jobs = server.call("GET", f"/sessions/{session}/reconstructions")
+    assert [job["parameters"]["step"] for job in jobs] == ["0.901%", "1.6%"]
+
+
+def test_a_file_that_is_none_is_refused_in_words(server: Server, page: Page, tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.rawnet"
+    wrong.write_text("1\n0\nabc\n")
+    page.goto(server.page())
+    before = server.call("GET", "/sessions")
+    page.locator("input[type=file]").set_input_files(wrong)
+    expect(page.get_by_role("alert")).to_contain_text("wrong.rawnet was not opened: ")
+    expect(page.get_by_role("alert")).to_contain_text("line")
+    assert server.call("GET", "/sessions") == before
 
 
 def test_an_address_of_nothing_says_so(server: Server, page: Page) -> None:

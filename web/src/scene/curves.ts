@@ -22,6 +22,7 @@ export class CurvesLayer {
   readonly object = new Group();
   readonly #shown = new Map<number, Shown>();
   #progress = 1;
+  #neutral = false;
   #highlighted: number | undefined;
 
   constructor(private palette: Palette) {}
@@ -52,6 +53,12 @@ export class CurvesLayer {
     this.#progress = Math.min(this.#progress + share, 1);
     for (const shown of this.#shown.values()) this.#move(shown);
     return this.#progress < 1;
+  }
+
+  /** Without a colour of their own, for surfaces whose colours mean something. */
+  neutralize(neutral: boolean): void {
+    this.#neutral = neutral;
+    this.recolor(this.palette);
   }
 
   highlight(index: number | undefined): void {
@@ -116,7 +123,7 @@ export class CurvesLayer {
     const { boundary, index } = shown.curve;
     const chosen = this.#highlighted === index;
     const width = (boundary ? BOUNDARY_WIDTH : INTERIOR_WIDTH) + (chosen ? HIGHLIGHT_EXTRA : 0);
-    const color = boundary ? this.palette.boundary : this.palette.interior;
+    const color = boundary || this.#neutral ? this.palette.boundary : this.palette.interior;
     shown.line.style(width, color, this.#highlighted === undefined || chosen ? 1 : DIMMED);
   }
 }

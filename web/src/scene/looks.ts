@@ -8,6 +8,8 @@ export interface Look {
   readonly name: LookName;
   readonly label: string;
   readonly hint: string;
+  /** Its colours mean something. */
+  readonly colored: boolean;
   readonly chunk: string;
 }
 
@@ -33,12 +35,14 @@ export const looks: readonly Look[] = [
     name: "shaded",
     label: "Shaded",
     hint: "Soft light from above the left shoulder",
+    colored: false,
     chunk: `${LIT} vec3 look(vec3 n, vec3 v) { return lit(base, n, v); }`,
   },
   {
     name: "isophotes",
     label: "Isophotes",
     hint: "Lines of equal brightness: kinks show a jump of the normal's change",
+    colored: false,
     chunk: `${LIT} vec3 look(vec3 n, vec3 v) {
       float band = stripes(12.0 * acos(clamp(dot(n, normalize(vec3(-0.35, 0.6, 0.75))), -1.0, 1.0)) / 3.14159265);
       return lit(mix(base * 0.12, base * 1.1, band), n, v);
@@ -48,6 +52,7 @@ export const looks: readonly Look[] = [
     name: "reflection",
     label: "Reflection lines",
     hint: "A ceiling of parallel lamps, mirrored in the surface",
+    colored: false,
     chunk: `${LIT} vec3 look(vec3 n, vec3 v) {
       vec3 r = reflect(-v, n);
       float band = stripes(8.0 * atan(r.x, r.y + 1.6));
@@ -58,6 +63,7 @@ export const looks: readonly Look[] = [
     name: "normals",
     label: "Normal map",
     hint: "Rings around the line of sight, red to blue, show continuity and symmetry",
+    colored: true,
     chunk: `${LIT} vec3 look(vec3 n, vec3 v) {
       vec3 side = normalize(cross(vec3(0.0, 1.0, 0.0), v));
       vec2 p = vec2(dot(n, side), dot(n, cross(v, side)));
@@ -73,6 +79,7 @@ export const looks: readonly Look[] = [
     name: "curvature",
     label: "Mean curvature",
     hint: "Mean of the principal curvatures, positive where the surface bends away from its outward normal",
+    colored: true,
     chunk: `${LIT} vec3 look(vec3 n, vec3 v) {
       vec3 color = texture2D(map, vec2(0.5 + 0.5 * clamp(value, -1.0, 1.0), 0.5)).rgb;
       return color * (0.72 + 0.28 * max(dot(n, v), 0.0));

@@ -7,7 +7,7 @@ import { CurvesLayer } from "./curves";
 import { Decorations } from "./decorations";
 import type { LoadedSurface } from "./glb";
 import { Ground } from "./ground";
-import type { LookName } from "./looks";
+import { lookNamed, type LookName } from "./looks";
 import type { Palette } from "./palette";
 import { drawOverlay, type Inks } from "./picture";
 import { Rig, VIEWS } from "./rig";
@@ -83,6 +83,7 @@ export class Viewport {
 
   setLook(look: LookName): void {
     if (this.#surface) this.#surface.look = look;
+    this.#curves.neutralize(this.#surface !== undefined && lookNamed(look).colored);
     this.invalidate();
   }
 

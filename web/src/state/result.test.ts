@@ -42,8 +42,13 @@ it("draws a curve in pieces when its segments do not meet", () => {
 });
 
 it("shows of a report what is there, and every warning", () => {
-  const report = { seconds: 1.5, surface: { faces: 1200, warnings: ["thin"] }, network: { warnings: ["long gap"] } };
+  const report = {
+    seconds: 1.5,
+    surface: { faces: 1200, warnings: ["thin"] },
+    network: { warnings: ["long gap"], uncertainty: { mean_m: 0.0012 } },
+  };
   expect(figuresOf(report)).toEqual([
+    { label: "Uncertainty, mean", value: "1.20 mm" },
     { label: "Triangles", value: "1\u202f200" },
     { label: "Time", value: "1.50 s" },
   ]);

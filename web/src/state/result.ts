@@ -79,3 +79,10 @@ export function warningsOf(report: Report): string[] {
   const lists = [report.network?.["warnings"], report.surface?.["warnings"]];
   return lists.flatMap((list) => (Array.isArray(list) ? list.map(String) : []));
 }
+
+/** A smoothing length that was chosen automatically, m. */
+export function chosenLength(report: Report | undefined, name: "stretch_m" | "bend_m"): number | undefined {
+  const parameters = report?.network?.["parameters"];
+  const value = parameters && typeof parameters === "object" ? (parameters as Record<string, unknown>)[name] : undefined;
+  return typeof value === "number" ? value : undefined;
+}

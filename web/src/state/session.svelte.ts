@@ -3,6 +3,7 @@ import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
 import type { ToBrowser } from "../protocol/messages";
 import { polylineLength } from "../geometry/vectors";
 import type { LiveDevice, Reconstruction, ReconstructionParameters, RecordingSummary, Session } from "../wire.gen";
+import { History } from "./history.svelte";
 import { Network } from "./network";
 import { loadResult, type Result } from "./result";
 
@@ -16,12 +17,16 @@ export interface CurveEntry {
   readonly length: number;
 }
 
+/** What a person may change about a curve with one click. */
+export type CurveFlag = "boundary" | "closed" | "removed";
+
 const LIST_PAUSE = 250;
 
 /** Everything about the session that is open. High-rate data (points) stays outside the reactive graph; `revision`
  * tells those who draw it that it changed. */
 export class SessionStore {
   readonly live = new Network();
+  readonly history = new History();
   session = $state<Session>();
   connection = $state<Connection>("connecting");
   devices = $state.raw<readonly LiveDevice[]>([]);
@@ -87,13 +92,42 @@ export class SessionStore {
     await this.#command(async () => (this.session = await this.api.renameSession(this.id, name)));
   }
 
+  /** Take in files as if devices had sent them. */
+  async upload(files: readonly File[]): Promise<void> {
+    await this.#command(async () => {
+      for (const file of files) await this.api.upload(this.id, file);
+      this.#outdate();
+    });
+  }
+
+  /** Begin a reconstruction; one that is under way is not wanted any more. */
   async reconstruct(parameters: Partial<ReconstructionParameters>): Promise<void> {
+    const before = this.reconstruction;
     await this.#command(async () => this.#progressed(await this.api.reconstruct(this.id, parameters)));
+    if (before && isBusy(before)) await this.api.cancel(before.id).catch(() => undefined);
   }
 
   async cancel(): Promise<void> {
     const { reconstruction } = this;
     if (reconstruction) await this.#command(async () => this.#progressed(await this.api.cancel(reconstruction.id)));
+  }
+
+  /** Change a curve; can be taken back. */
+  async edit(curve: CurveEntry, flag: CurveFlag, value: boolean): Promise<void> {
+    const set = async (to: boolean): Promise<void> => {
+      await this.api.updateCurve(this.id, curve.index, { [flag]: to });
+      this.#outdate();
+    };
+    const label = `curve ${curve.index + 1} ${nowIs(flag, value)}`;
+    await this.#command(() => this.history.do({ label, run: () => set(value), revert: () => set(!value) }));
+  }
+
+  async undo(): Promise<void> {
+    await this.#command(() => this.history.undo());
+  }
+
+  async redo(): Promise<void> {
+    await this.#command(() => this.history.redo());
   }
 
   #fold(message: Exclude<ToBrowser, LiveDevice | { type: "live.reconstruction" }>): void {
@@ -116,6 +150,7 @@ export class SessionStore {
   }
 
   #progressed(reconstruction: Reconstruction): void {
+    if (this.reconstruction && reconstruction.created < this.reconstruction.created) return;
     this.reconstruction = reconstruction;
     if (reconstruction.state === "done") void this.#attempt(() => this.#show(reconstruction));
   }
@@ -174,6 +209,17 @@ export class SessionStore {
       this.problem = inWords(error);
     }
   }
+}
+
+/** Whether a reconstruction has not ended yet. */
+export function isBusy(reconstruction: Reconstruction): boolean {
+  return reconstruction.state === "queued" || reconstruction.state === "running";
+}
+
+function nowIs(flag: CurveFlag, value: boolean): string {
+  if (flag === "boundary") return value ? "made boundary" : "made interior";
+  if (flag === "closed") return value ? "closed" : "opened";
+  return value ? "removed" : "brought back";
 }
 
 /** An error in words for the person in front of the screen. */

@@ -31,6 +31,22 @@ export class SessionsStore {
     return this.#attempt(() => this.api.createSession(name));
   }
 
+  /** A new session with these files in it, named after the first; nothing is left behind when one is refused. */
+  async open(files: readonly File[]): Promise<Session | undefined> {
+    const [first] = files;
+    if (!first) return undefined;
+    return this.#attempt(async () => {
+      const session = await this.api.createSession(first.name.replace(/\.[^.]*$/, ""));
+      try {
+        for (const file of files) await this.api.upload(session.id, file);
+      } catch (error) {
+        await this.api.deleteSession(session.id);
+        throw new Error(`${first.name} was not opened: ${inWords(error)}`, { cause: error });
+      }
+      return session;
+    });
+  }
+
   async rename(session: Session, name: string): Promise<void> {
     await this.#attempt(async () => {
       const renamed = await this.api.renameSession(session.id, name);
