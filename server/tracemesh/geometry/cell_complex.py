@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tracemesh.errors import NetworkError
-from tracemesh.geometry.cycles import Cycle, trace_cycles
+from tracemesh.geometry.cycles import Cycle, loop_points, trace_cycles
 from tracemesh.geometry.network import CurveNetwork, Segment
 
 # An opening seen from outside turns by -2 pi if the surface around it is flat, and by more the more it curves inwards.
@@ -30,6 +30,11 @@ class CellComplex:
     faces: tuple[Cycle, ...]
     openings: tuple[Cycle, ...]
     inferred: bool
+
+    def resampled(self, network: CurveNetwork) -> "CellComplex":
+        """The same complex over a network whose segments have other points."""
+        faces = tuple(replace(face, points=loop_points(network, face.sides)) for face in self.faces)
+        return replace(self, network=network, faces=faces)
 
 
 def cell_complex(network: CurveNetwork) -> CellComplex:

@@ -55,9 +55,14 @@ def trace_cycles(network: CurveNetwork) -> tuple[Cycle, ...]:
             side = following[side]
             if side == start:
                 break
-        points = np.concatenate([side_points(network, side)[:-1] for side in sides])
+        points = loop_points(network, tuple(sides))
         cycles.append(Cycle(tuple(sides), points, geodesic_turning(network.points[points], network.normals[points])))
     return tuple(cycles)
+
+
+def loop_points(network: CurveNetwork, sides: tuple[HalfSegment, ...]) -> Ints:
+    """(k,) point indices along a closed walk, without repeating the first."""
+    return np.concatenate([side_points(network, side)[:-1] for side in sides])
 
 
 def side_points(network: CurveNetwork, side: HalfSegment) -> Ints:

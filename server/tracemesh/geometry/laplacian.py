@@ -12,6 +12,8 @@ from scipy import sparse
 
 from tracemesh.geometry.network import Floats, Ints
 
+MOST_NEGATIVE_WEIGHT = -0.1  # of an edge: two angles that add to 192 degrees
+
 
 @dataclass(frozen=True)
 class Laplacian:
@@ -34,12 +36,16 @@ def cotangent_laplacian(corners: Floats, faces: Ints, count: int) -> Laplacian:
     return Laplacian(stiffness, lumped_mass(triangle_areas(corners), faces, count))
 
 
-def intrinsic_delaunay_laplacian(vertices: Floats, faces: Ints) -> Laplacian:
-    """Laplacian on the intrinsic Delaunay triangulation of a mesh (Sharp and Crane 2020): no negative weights, however
-    bad the faces.
+def surface_laplacian(vertices: Floats, faces: Ints) -> Laplacian:
+    """Laplacian of a mesh in space. vertices: (n, 3) m. faces: (f, 3).
 
-    vertices: (n, 3) m. faces: (f, 3).
+    On a Delaunay mesh the cotangent Laplacian; otherwise that of its intrinsic Delaunay triangulation (Sharp and Crane
+    2020),
+    which is the same where the mesh is Delaunay and has no negative weights, however bad the faces.
     """
+    plain = cotangent_laplacian(vertices[faces], faces, len(vertices))
+    if sparse.triu(plain.stiffness, k=1).data.min() > MOST_NEGATIVE_WEIGHT:
+        return plain
     stiffness, mass = robust_laplacian.mesh_laplacian(vertices, faces)
     return Laplacian(sparse.csr_matrix(-stiffness), np.asarray(mass.diagonal()))
 

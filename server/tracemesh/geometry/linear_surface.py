@@ -1,9 +1,11 @@
 """The linear solve for positions and normals of a triangulated network (thesis section 4.5)."""
 
+import numpy as np
+
 from tracemesh.geometry.biharmonic import BiharmonicSolver
 from tracemesh.geometry.curvature import mean_curvature, normalised
 from tracemesh.geometry.edges import boundary_vertices
-from tracemesh.geometry.laplacian import Laplacian, intrinsic_delaunay_laplacian
+from tracemesh.geometry.laplacian import Laplacian, surface_laplacian
 from tracemesh.geometry.network import Floats, Ints
 
 
@@ -15,12 +17,12 @@ def linear_surface(laplacian: Laplacian, faces: Ints, points: Floats, normals: F
     Raises SurfaceError if they do not determine the rest.
     """
     solver = BiharmonicSolver(laplacian, len(points), boundary_vertices(faces, len(laplacian.mass)))
-    base = solver.solve(points)
-    spread = normalised(solver.solve(normals))
+    base, spread = np.hsplit(solver.solve(np.hstack([points, normals])), 2)
+    spread = normalised(spread)
     target = (-2 * mean_curvature(base, faces, spread) * laplacian.mass)[:, None] * spread
     return solver.solve(points, target), spread
 
 
 def rebuilt_surface(vertices: Floats, faces: Ints, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
     """The same in the metric of a surface (n, 3) found before: planar patches measure lengths and angles too short."""
-    return linear_surface(intrinsic_delaunay_laplacian(vertices, faces), faces, points, normals)
+    return linear_surface(surface_laplacian(vertices, faces), faces, points, normals)

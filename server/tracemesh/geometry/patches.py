@@ -10,7 +10,10 @@ from tracemesh.geometry.curvature import normalised
 from tracemesh.geometry.cycles import Cycle
 from tracemesh.geometry.flattening import flatten
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints
+from tracemesh.geometry.quality import inverted_faces, triangle_angles
 from tracemesh.geometry.triangulation import triangulate_polygon
+
+SMALLEST_AVERAGE = 0.1  # length of the mean of unit normals below which its direction says nothing
 
 
 @dataclass(frozen=True)
@@ -39,20 +42,22 @@ class PatchMesh:
 
 
 def triangulate_patches(
-    network: CurveNetwork, complex_: CellComplex, spacing: float | None, last: tuple[PatchMesh, Floats] | None = None
+    complex_: CellComplex, spacing: float | None, coarsening: float, last: tuple[PatchMesh, Floats] | None = None
 ) -> PatchMesh:
     """Triangulate every face of a cell complex.
 
-    spacing: edge length inside, m; None takes each patch's own boundary spacing. last: a triangulation with vertices
+    spacing: edge length inside, m; None takes each patch's own boundary spacing. coarsening: factor on it. last: a
+    triangulation with vertices
     (n, 3)
     whose patches are unrolled to be triangulated again; None projects along average normals.
     """
+    network = complex_.network
     unrolled = None if last is None else _unrolled_loops(complex_, *last)
     fixed = count = len(network.points)
     planar, faces, vertex, patch, starts = [], [], [], [], []
     begin = 0
     for number, cycle in enumerate(complex_.faces):
-        loop, inside, triangles = _triangulate(network, cycle, spacing, unrolled and unrolled[number])
+        loop, inside, triangles = _triangulate(network, cycle, spacing, coarsening, unrolled and unrolled[number])
         planar += [loop, inside]
         faces.append(triangles + begin)
         vertex += [cycle.points, count + np.arange(len(inside))]
@@ -71,6 +76,17 @@ def triangulate_patches(
     )
 
 
+def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool:
+    """Whether triangles in space are nearly as well shaped as in the plane, and none is turned over. vertices:
+    (n, 3).
+    """
+    flat = np.column_stack([patches.planar, np.zeros(len(patches.planar))])
+    in_plane = triangle_angles(flat, patches.planar_faces).min(1)
+    in_space = triangle_angles(vertices, patches.faces).min(1)
+    enough = np.minimum(0.75 * in_plane, np.radians(20))
+    return bool((in_space >= enough).all()) and not inverted_faces(vertices, patches.faces, normals).any()
+
+
 def _unrolled_loops(complex_: CellComplex, patches: PatchMesh, vertices: Floats) -> list[Floats]:
     """Boundaries of all patches, unrolled from space into the plane."""
     planar = flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)
@@ -78,7 +94,7 @@ def _unrolled_loops(complex_: CellComplex, patches: PatchMesh, vertices: Floats)
 
 
 def _triangulate(
-    network: CurveNetwork, cycle: Cycle, spacing: float | None, unrolled: Floats | None
+    network: CurveNetwork, cycle: Cycle, spacing: float | None, coarsening: float, unrolled: Floats | None
 ) -> tuple[Floats, Floats, Ints]:
     """Loop in the plane, interior points and faces of one patch; the first map to the plane that is injective."""
     points, normals = network.points[cycle.points], network.normals[cycle.points]
@@ -86,7 +102,7 @@ def _triangulate(
     for loop in (unrolled, project_to_plane(points, normals), map_to_circle(points)):
         try:
             if loop is not None and signed_area(loop) > 0:
-                return loop, *triangulate_polygon(loop, size)
+                return loop, *triangulate_polygon(loop, size * coarsening)
         except SurfaceError:
             continue
     raise SurfaceError(f"the patch beside {segment_name(network, cycle.sides[0].segment)} cannot be triangulated")
@@ -97,11 +113,15 @@ def project_to_plane(points: Floats, normals: Floats) -> Floats | None:
     3).
     """
     average = normals.mean(0)
-    if np.linalg.norm(average) < 0.1:
+    if np.linalg.norm(average) < SMALLEST_AVERAGE:
         return None
     normal = normalised(average)
-    first = normalised(np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal))
-    return np.asarray((points - points.mean(0)) @ np.column_stack([first, np.cross(normal, first)]))
+    offset = points - points.mean(0)
+    offset -= np.outer(offset @ normal, normal)
+    distance = np.linalg.norm(offset, axis=1)
+    # An axis that turns with the loop, and does not flicker between corners that are equally far.
+    first = normalised(offset[np.argmax(distance > (1 - 1e-6) * distance.max())])
+    return np.asarray(offset @ np.column_stack([first, np.cross(normal, first)]))
 
 
 def map_to_circle(points: Floats) -> Floats:

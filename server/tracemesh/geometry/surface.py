@@ -14,11 +14,14 @@ from tracemesh.geometry.laplacian import cotangent_laplacian
 from tracemesh.geometry.linear_surface import linear_surface, rebuilt_surface
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
-from tracemesh.geometry.patches import PatchMesh, triangulate_patches
+from tracemesh.geometry.patches import PatchMesh, triangulate_patches, unrolled_well
 from tracemesh.geometry.quality import mesh_quality
 from tracemesh.geometry.refinement import refine
+from tracemesh.geometry.subdivision import subdivided
 
 Progress = Callable[[str, float], None]
+COARSE = 3.0  # edges inside the patches of the first solve, which only serves to unroll them, over those of the mesh
+LARGEST_UNROLLS = 4
 REBUILDS = 2  # solves in the metric of the last one; more change little
 
 
@@ -56,7 +59,9 @@ def span_surface(
     stages = _Stages(progress)
     stages.begin("cycles", 0.0)
     complex_ = cell_complex(network)
-    patches, vertices, normals = _linear(network, complex_, parameters, stages)
+    if parameters.mesh_size is not None:
+        complex_ = complex_.resampled(subdivided(complex_.network, parameters.mesh_size))
+    patches, vertices, normals = _linear(complex_, parameters, stages)
     refinement: dict[str, object] = {"mode": parameters.refinement, "used": False}
     if parameters.refinement != "off":
         stages.begin("refinement", 0.5)
@@ -71,23 +76,30 @@ def span_surface(
 
 
 def _linear(
-    network: CurveNetwork, complex_: CellComplex, parameters: SurfaceParameters, stages: "_Stages"
+    complex_: CellComplex, parameters: SurfaceParameters, stages: "_Stages"
 ) -> tuple[PatchMesh, Floats, Floats]:
-    """Patches, vertices and normals: once over projected patches, then over the same unrolled, then rebuilt."""
+    """Patches, vertices and normals: over projected patches, then over the same unrolled, then rebuilt."""
+    points, normals = complex_.network.points, complex_.network.normals
     last = None
-    for step in range(2):
-        stages.begin("patches", 0.1 + 0.15 * step)
-        patches = triangulate_patches(network, complex_, parameters.mesh_size, last)
-        stages.begin("surface", 0.15 + 0.15 * step)
+    for attempt in range(LARGEST_UNROLLS + 1):
+        stages.begin("patches", 0.1 + 0.05 * attempt)
+        patches = triangulate_patches(complex_, parameters.mesh_size, COARSE if last is None else 1.0, last)
+        stages.begin("surface", 0.12 + 0.05 * attempt)
         flat = cotangent_laplacian(patches.planar[patches.planar_faces], patches.faces, patches.count)
-        vertices, normals = linear_surface(flat, patches.faces, network.points, network.normals)
+        vertices, spread = linear_surface(flat, patches.faces, points, normals)
+        if last is not None:
+            if unrolled_well(patches, vertices, spread):
+                break
+            vertices, spread = rebuilt_surface(vertices, patches.faces, points, normals)
         last = (patches, vertices)
     for step in range(REBUILDS):
         stages.begin("rebuild", 0.35 + 0.15 * step / REBUILDS)
-        vertices, normals = rebuilt_surface(vertices, patches.faces, network.points, network.normals)
+        rebuilt, spread = rebuilt_surface(vertices, patches.faces, points, normals)
+        # Along the normal only: sideways nothing holds the vertices, and triangles would drift out of shape.
+        vertices = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
     if not np.isfinite(vertices).all():
         raise SurfaceError("the surface is not determined by the network: positions are not finite")
-    return patches, vertices, normals
+    return patches, vertices, spread
 
 
 def _report(mesh: Mesh, complex_: CellComplex, stages: "_Stages") -> dict[str, object]:

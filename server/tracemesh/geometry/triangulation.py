@@ -12,23 +12,54 @@ from tracemesh.errors import SurfaceError
 from tracemesh.geometry.network import Floats, Ints
 
 CLEARANCE = 0.62  # smallest distance of a lattice point to the boundary, in lattice spacings
-SMOOTHING_STEPS = 4
+GROWTH = 0.5  # of the spacing per distance from the boundary, where the inside is coarser
+RELAXATIONS = 2  # of two smoothing steps each
 
 
 def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
     """Triangles inside a simple polygon.
 
-    loop: (k, 2) corners, counter-clockwise. spacing: wanted length of interior edges.
+    loop: (k, 2) corners, counter-clockwise. spacing: wanted length of interior edges; where it is larger than the edges
+    of
+    the loop, triangles grow away from them.
     Returns interior points (m, 2) and faces (f, 3), counter-clockwise, indices into loop then interior points.
     No edge inside joins two corners of the loop, except across an acute corner. Raises SurfaceError if the polygon
     crosses itself.
     """
-    inside = _lattice(loop, spacing)
+    inside = _graded_lattice(loop, spacing)
     faces = _constrained_delaunay(loop, inside)
-    for _ in range(SMOOTHING_STEPS if len(inside) else 0):
-        inside = _smoothed(loop, inside, faces)
+    for _ in range(RELAXATIONS if len(inside) else 0):
+        inside = _smoothed(loop, _smoothed(loop, inside, faces), faces)
         faces = _constrained_delaunay(loop, inside)
     return _split_chords(loop, inside, faces)
+
+
+def _graded_lattice(loop: Floats, spacing: float) -> Floats:
+    """(m, 2) points inside a polygon: lattices of doubling spacing, each where the distance to the boundary
+    allows it.
+    """
+    finest = min(spacing, float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).mean()))
+    steps = max(1, round(float(np.log2(spacing / finest))) + 1)
+    sizes = [spacing * 0.5**k for k in range(steps)]
+    samples = cKDTree(_densified(loop, sizes[-1] / 4))
+    points, farthest = np.empty((0, 2)), np.inf
+    for size in sizes:
+        nearest = CLEARANCE * size + (size - sizes[-1]) / GROWTH
+        level = _lattice(loop, size)
+        distance = samples.query(level)[0]
+        level = level[(distance > nearest) & (distance <= farthest)]
+        if len(points) and len(level):
+            level = level[cKDTree(points).query(level)[0] > size]
+        points, farthest = np.vstack([points, level]), nearest + size
+    return points
+
+
+def _densified(loop: Floats, spacing: float) -> Floats:
+    """Points along a polygon's edges, no farther from each other than the spacing."""
+    edges = np.roll(loop, -1, axis=0) - loop
+    parts = np.ceil(np.linalg.norm(edges, axis=1) / spacing).astype(np.int64)
+    step = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    return np.asarray(np.repeat(loop, parts, axis=0) + np.repeat(edges / parts[:, None], parts, axis=0) * step[:, None])
 
 
 def _constrained_delaunay(loop: Floats, inside: Floats) -> Ints:
@@ -48,7 +79,7 @@ def _constrained_delaunay(loop: Floats, inside: Floats) -> Ints:
 
 
 def _lattice(loop: Floats, spacing: float) -> Floats:
-    """(m, 2) points of a hexagonal lattice inside a polygon, not too near to its edges."""
+    """(m, 2) points of a hexagonal lattice inside a polygon."""
     rows, low = _row_numbers(loop, spacing)
     starts, ends, row = _spans(loop, low + rows * spacing * np.sqrt(0.75), rows)
     shift = loop[:, 0].min() + 0.5 * spacing * (row % 2)
@@ -56,8 +87,7 @@ def _lattice(loop: Floats, spacing: float) -> Floats:
     count = np.maximum(last - first + 1, 0).astype(np.int64)
     step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     x = np.repeat(first * spacing + shift, count) + step * spacing
-    points = np.column_stack([x, np.repeat(low + row * spacing * np.sqrt(0.75), count)])
-    return points[_clearance(loop, points, spacing) > CLEARANCE * spacing]
+    return np.column_stack([x, np.repeat(low + row * spacing * np.sqrt(0.75), count)])
 
 
 def _row_numbers(loop: Floats, spacing: float) -> tuple[Ints, float]:
@@ -74,14 +104,6 @@ def _spans(loop: Floats, heights: Floats, rows: Ints) -> tuple[Floats, Floats, I
     x = a[edge, 0] + along * (b[edge, 0] - a[edge, 0])
     order = np.lexsort((x, row))
     return x[order][0::2], x[order][1::2], rows[row[order][0::2]]
-
-
-def _clearance(loop: Floats, points: Floats, spacing: float) -> Floats:
-    """(m,) distance of points to the polygon's edges, sampled at a quarter of the spacing."""
-    edges = np.roll(loop, -1, axis=0) - loop
-    parts = max(1, int(np.ceil(4 * np.linalg.norm(edges, axis=1).max() / spacing)))
-    samples = (loop[:, None] + edges[:, None] * (np.arange(parts) / parts)[:, None]).reshape(-1, 2)
-    return np.asarray(cKDTree(samples).query(points)[0])
 
 
 def _smoothed(loop: Floats, inside: Floats, faces: Ints) -> Floats:
