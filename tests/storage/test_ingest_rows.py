@@ -1,0 +1,161 @@
+"""Laws of ingest: what is stored does not depend on how it was grouped, nor on restarts in between."""
+
+from dataclasses import asdict
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sqlalchemy import select
+
+from tracemesh.errors import Refused
+from tracemesh.storage.curves import list_curves
+from tracemesh.storage.database import Database
+from tracemesh.storage.ingest import Group, commit, open_recording
+from tracemesh.storage.models import MessageRow, RecordingRow, new_id
+from tracemesh.storage.recordings import recording_messages, recording_row
+from tracemesh.storage.states import RecordingState
+from tracemesh.wire.base import Count
+from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Recorded, Samples, Wheel
+
+HELLO = Hello(recording="r", device=Device(id="d", kind="test", wheel=Wheel(circumference=0.1, ticks_per_turn=500)))
+FLAT = {"tangent": [(1.0, 0.0, 0.0)], "normal": [(0.0, 0.0, 1.0)]}
+
+
+@st.composite
+def rides(draw: st.DrawFn) -> list[Recorded]:
+    """Valid messages of up to four curves, in any order that the protocol allows."""
+    messages: list[Recorded] = []
+    counts: dict[int, int] = {}
+    marks: list[tuple[int, int, int]] = []
+    ended: set[int] = set()
+    for _ in range(draw(st.integers(1, 40))):
+        curve = draw(st.integers(0, 3))
+        kind = draw(st.sampled_from(["samples", "samples", "node", "undo", "end"]))
+        seq: Count = len(messages)
+        if curve not in counts:
+            messages.append(CurveStart(seq=seq, curve=curve, boundary=draw(st.booleans())))
+            counts[curve] = 0
+        elif kind == "samples" and curve not in ended:
+            ticks = [(draw(st.integers(0, 65535)), draw(st.integers(0, 499)))]
+            messages.append(Samples(seq=seq, curve=curve, first_sample=counts[curve], ticks=ticks, **FLAT))
+            counts[curve] += 1
+        elif kind == "node" and counts[curve]:
+            mark = (curve, draw(st.integers(0, counts[curve] - 1)), draw(st.integers(0, 5)))
+            if mark not in marks:
+                marks.append(mark)
+                messages.append(NodeMark(seq=seq, curve=curve, sample=mark[1], node=mark[2]))
+        elif kind == "undo" and marks:
+            mark = marks.pop(draw(st.integers(0, len(marks) - 1)))
+            messages.append(NodeMark(seq=seq, curve=mark[0], sample=mark[1], node=mark[2], undo=True))
+        elif kind == "end" and curve not in ended:
+            messages.append(CurveEnd(seq=seq, curve=curve, closed=draw(st.booleans())))
+            ended.add(curve)
+    return messages
+
+
+def store(
+    database: Database, hello: Hello, messages: list[Recorded], groups: list[int], restart: bool
+) -> RecordingState:
+    """Commit in groups that end before these numbers, forgetting everything in between if `restart`."""
+    state: RecordingState | None = None
+    for first, last in zip([0, *groups], [*groups, len(messages)], strict=True):
+        if state is None or restart:
+            with database.write() as transaction:
+                state = open_recording(transaction, hello, hello.model_dump_json().encode())
+        group = Group()
+        for message in messages[first:last]:
+            payload = message.model_dump_json(exclude_none=True).encode()
+            state.check(message)
+            state.advance(message, len(payload))
+            group.add(state, message, payload)
+        with database.write() as transaction:
+            commit(transaction, group)
+    assert state is not None
+    return state
+
+
+def known(state: RecordingState) -> tuple[object, ...]:
+    """What a state knows, less the names that differ from run to run."""
+    curves = {number: asdict(curve) for number, curve in state.curves.items()}
+    return state.next_seq, state.bytes, state.session.next_index, state.session.bytes, curves
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rides(), st.data())
+def test_groups_and_restarts_do_not_matter(database: Database, messages: list[Recorded], data: st.DataObject) -> None:
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(messages)), max_size=4)))
+    one = HELLO.model_copy(update={"recording": new_id()})
+    two = HELLO.model_copy(update={"recording": new_id()})
+    whole = store(database, one, messages, [], restart=False)
+    pieces = store(database, two, messages, cuts, restart=True)
+    assert known(whole) == known(pieces)
+    with database.write() as transaction:
+        assert known(open_recording(transaction, two, b"")) == known(pieces)
+        assert list(recording_messages(transaction, whole.key)) == list(recording_messages(transaction, pieces.key))
+        curves = [list_curves(transaction, s.session.id) for s in (whole, pieces)]
+        assert [c.model_copy(update={"recording": "x"}) for c in curves[0]] == [
+            c.model_copy(update={"recording": "x"}) for c in curves[1]
+        ]
+        assert sorted((c.index, m.sample, m.node) for c in curves[0] for m in c.marks) == marks_obviously(messages)
+
+
+def marks_obviously(messages: list[Recorded]) -> list[tuple[int, int, int]]:
+    """Marks (curve's place in the order of starting, sample, node) one after another."""
+    order: list[int] = []
+    marks: list[tuple[int, int, int]] = []
+    for message in messages:
+        if isinstance(message, CurveStart):
+            order.append(message.curve)
+        elif isinstance(message, NodeMark):
+            mark = (order.index(message.curve), message.sample, message.node)
+            if message.undo:
+                marks.remove(mark)
+            else:
+                marks.append(mark)
+    return sorted(marks)
+
+
+def test_a_group_is_stored_whole_or_not_at_all(database: Database) -> None:
+    """The last row of a group contradicts the database: nothing of its other recordings is there either."""
+    with database.write() as transaction:
+        good = open_recording(transaction, HELLO, HELLO.model_dump_json().encode())
+    group = Group()
+    for message in [CurveStart(seq=0, curve=0), CurveEnd(seq=1, curve=0)]:
+        good.advance(message, 1)
+        group.add(good, message, b"x")
+    group.messages.append({"recording_key": good.key + 1000, "seq": 0, "payload": b"y"})
+    with pytest.raises(Exception, match=r"(?i)foreign key"), database.write() as transaction:
+        commit(transaction, group)
+    with database.read() as transaction:
+        assert transaction.scalars(select(MessageRow)).all() == []
+        assert transaction.scalar(select(RecordingRow.next_seq)) == 0
+
+
+def test_pages_of_messages_are_all_messages(database: Database) -> None:
+    messages: list[Recorded] = [CurveStart(seq=0, curve=0)]
+    messages += [Samples(seq=i, curve=0, first_sample=i - 1, distance=[0.0], **FLAT) for i in range(1, 450)]
+    state = store(database, HELLO, messages, [], restart=False)
+    with database.read() as transaction:
+        row = recording_row(transaction, state.session.id, "r")
+        stored = list(recording_messages(transaction, row.key))
+        assert stored == [m.model_dump_json(exclude_none=True).encode() for m in messages]
+        assert list(recording_messages(transaction, row.key, first=400)) == stored[400:]
+
+
+def test_the_same_recording_may_be_in_two_sessions(database: Database) -> None:
+    """A file is a copy; the device goes on with its own."""
+    with database.write() as transaction:
+        own = open_recording(transaction, HELLO, HELLO.model_dump_json().encode())
+        other = open_recording(
+            transaction, HELLO.model_copy(update={"recording": "s"}), HELLO.model_dump_json().encode()
+        )
+        copy = HELLO.model_copy(update={"session": other.session.id})
+        copied = open_recording(transaction, copy, HELLO.model_dump_json().encode())
+        assert copied.key != own.key
+        assert open_recording(transaction, HELLO, b"").key == own.key
+        assert open_recording(transaction, copy, b"").key == copied.key
+
+
+def test_versions_must_meet(database: Database) -> None:
+    with pytest.raises(Refused, match="version"), database.write() as transaction:
+        open_recording(transaction, HELLO.model_copy(update={"versions": [7]}), b"")
