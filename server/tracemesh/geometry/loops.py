@@ -12,8 +12,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from tracemesh.geometry.attachment import Places, attach, table_of
-from tracemesh.geometry.contacts import NORMAL
-from tracemesh.geometry.crossings import LEAST_ANGLE, crossing_odds, find_crossings
+from tracemesh.geometry.contacts import NORMAL, Contact, settle
+from tracemesh.geometry.crossings import LEAST_ANGLE, Crossing, crossing_odds, find_crossings
 from tracemesh.geometry.floating import FloatingCurve, Pose
 from tracemesh.geometry.network import Floats, Ints
 
@@ -26,6 +26,7 @@ _PART = 0.06
 """m, length of the parts of a loop that count as one voter."""
 _QUERIES = 3000
 _CANDIDATES = 12
+_FINALISTS = 3
 _LEAST = 3.0
 """Natural logarithm of the odds that a loop's place must have at least."""
 
@@ -49,23 +50,27 @@ class _Votes:
 
 
 def place_loop(
-    loop: FloatingCurve,
-    curves: Sequence[FloatingCurve],
-    poses: dict[int, Pose],
-    loose: Sequence[FloatingCurve],
+    index: int, curves: Sequence[FloatingCurve], poses: dict[int, Pose], contacts: Sequence[Contact]
 ) -> PlacedLoop | None:
-    """Best place of a closed curve among placed curves and loose open ones; None without a convincing one."""
+    """Best place of a closed curve among those that have a pose and touch in these contacts, and among loose open ones.
+
+    None when no place is convincing.
+    """
+    loop = curves[index]
+    loose = [c for i, c in enumerate(curves) if not c.closed and i not in poses]
     places = table_of(curves, poses)
     parts = int(loop.length / _PART) + 1
     votes = [_crossing_votes(loop, places)]
     votes += [_link_votes(loop, places, curve, parts + k) for k, curve in enumerate(loose)]
-    candidates = _peaks(_joined(votes))
-    tried = [(_evidence(loop, Pose(0.0, shift), curves, poses, loose), shift) for shift in candidates]
+    tried = [(_evidence(index, {**poses, index: pose}, curves), pose) for pose in _peaks(_joined(votes))]
     tried.sort(key=lambda t: -t[0])
-    if not tried or tried[0][0] < _LEAST:
+    settled = [_settled(index, {**poses, index: pose}, curves, contacts) for _, pose in tried[:_FINALISTS]]
+    settled.sort(key=lambda t: -t[0])
+    if not settled or settled[0][0] < _LEAST:
         return None
-    lead = tried[0][0] - (tried[1][0] if len(tried) > 1 else 0.0)
-    return PlacedLoop(Pose(0.0, tried[0][1]), tried[0][0], float(1 / (1 + np.exp(-lead))))
+    evidence, pose = settled[0]
+    elsewhere = [e for e, p in settled if np.linalg.norm(p.shift - pose.shift) > 3 * _SPREAD]
+    return PlacedLoop(pose, evidence, float(1 / (1 + np.exp(max(elsewhere, default=0.0) - evidence))))
 
 
 def _crossing_votes(loop: FloatingCurve, places: Places) -> _Votes:
@@ -99,7 +104,7 @@ def _joined(votes: Sequence[_Votes]) -> _Votes:
     return _Votes(*(np.concatenate([getattr(v, name) for v in votes]) for name in ("shift", "weight", "voter")))
 
 
-def _peaks(votes: _Votes) -> Iterator[Floats]:
+def _peaks(votes: _Votes) -> Iterator[Pose]:
     """Shifts with the most different voters around them, the best first, each far from those before."""
     if not len(votes.shift):
         return
@@ -116,24 +121,35 @@ def _peaks(votes: _Votes) -> Iterator[Floats]:
         top = int(scores.argmax())
         if scores[top] <= 0:
             return
-        yield centres[top]
+        yield Pose(0.0, centres[top])
         scores[np.linalg.norm(centres - centres[top], axis=1) < 3 * _SPREAD] = 0
 
 
-def _evidence(
-    loop: FloatingCurve,
-    pose: Pose,
-    curves: Sequence[FloatingCurve],
-    poses: dict[int, Pose],
-    loose: Sequence[FloatingCurve],
-) -> float:
-    """Logarithm of the odds of a place: the crossings that it makes, and the open curves that it gives an end."""
-    total = 0.0
-    for index, other in poses.items():
-        total += sum(np.log1p(crossing_odds(c)) for c in find_crossings(loop, pose, curves[index], other))
-    places = table_of([*curves, loop], {**poses, len(curves): pose})
-    for link in loose:
+def _evidence(index: int, poses: dict[int, Pose], curves: Sequence[FloatingCurve]) -> float:
+    """Logarithm of the odds of a loop's place: by the crossings that it makes and the open curves that it ends."""
+    total = sum(float(np.log1p(crossing_odds(c))) for _, c in _crossings(index, poses, curves))
+    places = table_of(curves, poses)
+    for link in (c for i, c in enumerate(curves) if not c.closed and i not in poses):
         found = attach(link, places)
-        if found is not None and len(curves) in (places.curve[found.first], places.curve[found.last]):
+        if found is not None and index in (places.curve[found.first], places.curve[found.last]):
             total += found.evidence
-    return float(total)
+    return total
+
+
+def _crossings(index: int, poses: dict[int, Pose], curves: Sequence[FloatingCurve]) -> Iterator[tuple[int, Crossing]]:
+    for other in poses:
+        if other != index:
+            for found in find_crossings(curves[index], poses[index], curves[other], poses[other]):
+                yield other, found
+
+
+def _settled(
+    index: int, poses: dict[int, Pose], curves: Sequence[FloatingCurve], contacts: Sequence[Contact]
+) -> tuple[float, Pose]:
+    """Evidence for a place, and the place, after everything was moved to suit the crossings there."""
+    added = [Contact(index, c.s, other, c.t, 1.0) for other, c in _crossings(index, poses, curves)]
+    if not added:
+        return _evidence(index, poses, curves), poses[index]
+    settled = settle(curves, poses, [*contacts, *added])
+    strain = float(settled.misfit.sum()) / 2
+    return _evidence(index, settled.poses, curves) - strain, settled.poses[index]

@@ -13,6 +13,7 @@ from tracemesh.geometry.network import Floats, Ints
 
 CLEARANCE = 0.62  # smallest distance of a lattice point to the boundary, in lattice spacings
 GROWTH = 0.5  # of the spacing per distance from the boundary, where the inside is coarser
+SHORT = 0.5  # an edge over the longer one beside it
 RELAXATIONS = 2  # of two smoothing steps each
 
 
@@ -26,15 +27,53 @@ def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
     No edge inside joins two corners of the loop, except across an acute corner. Raises SurfaceError if the polygon
     crosses itself.
     """
-    inside = _graded_lattice(loop, spacing)
-    faces = _constrained_delaunay(loop, inside)
+    fixed = np.vstack([loop, _points_beside_short_edges(loop)])
+    inside = _graded_lattice(loop, fixed, spacing)
+    faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))
     for _ in range(RELAXATIONS if len(inside) else 0):
-        inside = _smoothed(loop, _smoothed(loop, inside, faces), faces)
-        faces = _constrained_delaunay(loop, inside)
+        inside = _smoothed(fixed, _smoothed(fixed, inside, faces), faces)
+        faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))
+    inside = np.vstack([fixed[len(loop) :], inside])
     return _split_chords(loop, inside, faces)
 
 
-def _graded_lattice(loop: Floats, spacing: float) -> Floats:
+def _points_beside_short_edges(loop: Floats) -> Floats:
+    """(m, 2) a point inside of every edge much shorter than one beside it: where it opens the smallest angle of its
+    triangles
+    with the edge and the two beside it most.
+    """
+    count = len(loop)
+    length = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    longest = np.maximum(np.roll(length, 1), np.roll(length, -1))
+    found = np.empty((0, 2))
+    for k in np.flatnonzero(length < SHORT * longest):
+        corners = loop[[(k + i) % count for i in (-1, 0, 1, 2)]]
+        candidates = corners[1:3].mean(0) + longest[k] * _half_disk(corners[2] - corners[1])
+        angles = np.min([_angles(corners[i], corners[i + 1], candidates) for i in range(3)], axis=0)
+        others = np.delete(loop, [(k + i) % count for i in (-1, 0, 1, 2)], axis=0)
+        far = cKDTree(np.vstack([others, found])).query(candidates)[0] > CLEARANCE * longest[k] / 2
+        if (angles * far).max() > 0:
+            found = np.vstack([found, candidates[np.argmax(angles * far)]])
+    return found
+
+
+def _half_disk(direction: Floats) -> Floats:
+    """(m, 2) points of half a disk of radius 1 left of a direction."""
+    radius, turn = (a.ravel() for a in np.meshgrid(np.linspace(0.1, 0.6, 11), np.linspace(0, np.pi, 19)[1:-1]))
+    unit = complex(*direction) / abs(complex(*direction))
+    points = radius * np.exp(1j * turn) * unit
+    return np.column_stack([points.real, points.imag])
+
+
+def _angles(start: Floats, end: Floats, tips: Floats) -> Floats:
+    """(m,) rad, smallest angle of the triangles of an edge and tips (m, 2) left of it; negative for tips right
+    of it.
+    """
+    a, b, c = (complex(*start), complex(*end), tips[:, 0] + 1j * tips[:, 1])
+    return np.min([np.angle((c - a) / (b - a)), np.angle((a - b) / (c - b)), np.angle((b - c) / (a - c))], axis=0)
+
+
+def _graded_lattice(loop: Floats, fixed: Floats, spacing: float) -> Floats:
     """(m, 2) points inside a polygon: lattices of doubling spacing, each where the distance to the boundary
     allows it.
     """
@@ -42,16 +81,17 @@ def _graded_lattice(loop: Floats, spacing: float) -> Floats:
     steps = max(1, round(float(np.log2(spacing / finest))) + 1)
     sizes = [spacing * 0.5**k for k in range(steps)]
     samples = cKDTree(_densified(loop, sizes[-1] / 4))
-    points, farthest = np.empty((0, 2)), np.inf
+    points, farthest = fixed[len(loop) :], np.inf
+    beside = len(points)
     for size in sizes:
         nearest = CLEARANCE * size + (size - sizes[-1]) / GROWTH
         level = _lattice(loop, size)
         distance = samples.query(level)[0]
         level = level[(distance > nearest) & (distance <= farthest)]
         if len(points) and len(level):
-            level = level[cKDTree(points).query(level)[0] > size]
+            level = level[cKDTree(points).query(level)[0] > size]  # also off the points beside short edges
         points, farthest = np.vstack([points, level]), nearest + size
-    return points
+    return points[beside:]
 
 
 def _densified(loop: Floats, spacing: float) -> Floats:
@@ -62,15 +102,16 @@ def _densified(loop: Floats, spacing: float) -> Floats:
     return np.asarray(np.repeat(loop, parts, axis=0) + np.repeat(edges / parts[:, None], parts, axis=0) * step[:, None])
 
 
-def _constrained_delaunay(loop: Floats, inside: Floats) -> Ints:
-    """(f, 3) faces of the constrained Delaunay triangulation of a polygon and points inside it."""
-    count = len(loop)
+def _constrained_delaunay(count: int, points: Floats) -> Ints:
+    """(f, 3) faces of the constrained Delaunay triangulation of the polygon of the first points with the others
+    inside.
+    """
     corners = np.arange(count, dtype=np.uint32)
     mesh = pythoncdt.Triangulation(
         pythoncdt.VertexInsertionOrder.AUTO, pythoncdt.IntersectingConstraintEdges.NOT_ALLOWED, 0.0
     )
     try:
-        mesh.insert_vertices(np.vstack([loop, inside]))
+        mesh.insert_vertices(points)
         mesh.insert_edges(np.column_stack([corners, np.roll(corners, -1)]))
     except RuntimeError as error:
         raise SurfaceError(f"the polygon crosses or touches itself: {error}") from None
@@ -106,15 +147,15 @@ def _spans(loop: Floats, heights: Floats, rows: Ints) -> tuple[Floats, Floats, I
     return x[order][0::2], x[order][1::2], rows[row[order][0::2]]
 
 
-def _smoothed(loop: Floats, inside: Floats, faces: Ints) -> Floats:
-    """Interior points moved to the area-weighted mean of the centroids of their triangles."""
-    points = np.vstack([loop, inside])
+def _smoothed(fixed: Floats, inside: Floats, faces: Ints) -> Floats:
+    """Free points moved to the area-weighted mean of the centroids of their triangles."""
+    points = np.vstack([fixed, inside])
     a, b, c = points[faces].transpose(1, 0, 2)
     area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     weight = np.bincount(faces.ravel(), np.repeat(area, 3), len(points))
     moment = (a + b + c) / 3 * area[:, None]
     mean = np.column_stack([np.bincount(faces.ravel(), np.repeat(moment[:, k], 3), len(points)) for k in range(2)])
-    return np.asarray(mean[len(loop) :] / weight[len(loop) :, None])
+    return np.asarray(mean[len(fixed) :] / weight[len(fixed) :, None])
 
 
 def _split_chords(loop: Floats, inside: Floats, faces: Ints) -> tuple[Floats, Ints]:
