@@ -6,7 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from time import perf_counter
 
-from benchmarks import accuracy, growth, noisy, regression, surfacing, times
+from benchmarks import accuracy, growth, nodes, noisy, regression, surfacing, times
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
 from benchmarks.report import read_report, record, write_report
@@ -16,6 +16,7 @@ TABLES: dict[str, Callable[[Data], Table]] = {
     "surfacing": surfacing.surfacing,
     "noisy": noisy.noisy,
     "uncertainty": noisy.uncertainty,
+    "nodes": nodes.nodes,
     "author": accuracy.author,
     "steps": accuracy.steps,
     "weights": accuracy.weights,

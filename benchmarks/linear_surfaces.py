@@ -17,12 +17,14 @@ from tracemesh.geometry.patches import triangulate_patches
 
 @dataclass(frozen=True)
 class Patches:
-    """faces: (m, 3). stiffness: C, negative semidefinite; mass: (n,) m^2, both of the planar patches. network: what the
-    first vertices are held to.
+    """network: what the first vertices are held to. faces: (m, 3), in space; patch: (m,) that each belongs to; planar:
+    (m, 3, 2) m, its corners in the patch's plane. stiffness: C, negative semidefinite; mass: (n,) m^2, in the plane.
     """
 
     network: CurveNetwork
     faces: Ints
+    patch: Ints
+    planar: Floats
     stiffness: sparse.csr_matrix
     mass: Floats
 
@@ -32,9 +34,10 @@ Method = Callable[[Patches], Floats]
 
 
 def planar_patches(network: CurveNetwork) -> Patches:
-    patches = triangulate_patches(cell_complex(network), None)
-    laplacian = cotangent_laplacian(patches.planar[patches.planar_faces], patches.faces, patches.count)
-    return Patches(network, patches.faces, laplacian.stiffness, laplacian.mass)
+    patches = triangulate_patches(cell_complex(network), None, 1.0)
+    planar = patches.planar[patches.planar_faces]
+    laplacian = cotangent_laplacian(planar, patches.faces, patches.count)
+    return Patches(network, patches.faces, patches.patch, planar, laplacian.stiffness, laplacian.mass)
 
 
 def biharmonic(patches: Patches) -> Floats:

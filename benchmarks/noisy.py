@@ -8,7 +8,7 @@ from benchmarks.measuring import Floats, paired_motion
 from benchmarks.table import Cell, Column, Table
 from benchmarks.truths import CurveTruth
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
+from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.shapes import SHAPES
 
 WANTED = {"sphere": 0.12, "torus": 0.15, "cone": 0.10, "bumpy": 0.12, "lilium": 0.15, "lilium7": 0.13}
@@ -63,7 +63,7 @@ def normalised_errors(known: KnownScan) -> Floats:
     result = reconstruct_network(known.scan)
     truth = partners(result.network, known.truth)
     motion = paired_motion(result.network.points, truth)
-    return np.asarray(np.linalg.norm(motion.apply(result.network.points) - truth, axis=1) / _uncertainty(result))
+    return np.asarray(np.linalg.norm(motion.apply(result.network.points) - truth, axis=1) / result.uncertainty)
 
 
 def partners(network: CurveNetwork, truth: CurveNetwork) -> Floats:
@@ -80,11 +80,6 @@ def _shares(points: Floats) -> Floats:
     """Share (k,) of a polyline's length at each of its points (k, 3)."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     return np.asarray(length / length[-1])
-
-
-def _uncertainty(result: NetworkResult) -> Floats:
-    assert result.uncertainty is not None
-    return result.uncertainty
 
 
 def _scores(name: str, seeds: int) -> Floats:

@@ -7,7 +7,8 @@ from benchmarks.apart import apart
 from benchmarks.data import Data, KnownScan, noisy_scan
 from benchmarks.measuring import warm_seconds
 from benchmarks.table import Cell, Column, Table
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.energy import Weights
+from tracemesh.geometry.reconstruction import NetworkParameters, NetworkReconstruction, reconstruct_network
 from tracemesh.geometry.scan import Scan
 from tracemesh.pipeline import reconstruct
 from tracemesh.wire.resources import ReconstructionParameters
@@ -41,11 +42,13 @@ COLUMNS = (
         for part in ("network", "network and surface")
         for state in ("cold", "warm")
     ),
+    Column("other weights, ms", ".1f"),
     Column("thesis: network, ms", ".0f"),
 )
 
 NOTES = (
-    """Cold: the first call in a new process, without imports. Warm: median of 5 calls in one process. Scans are
+    """Cold: the first call in a new process, without imports. Warm: median of 5 calls in one process. Other
+    weights: the network with other smoothing lengths, the scan having been made ready before. Scans are
     noisy, all choices automatic; reading the file is not counted. Thesis: Table 3.9 (convolution, regression
     and Poisson; C++ on a quad-core computer of its day), published, not measured here.""",
 )
@@ -85,6 +88,7 @@ def _row(data: Data, size: int, repeats: int) -> tuple[Cell, ...]:
         1e3 * warm_seconds(lambda: reconstruct_network(scan, network), repeats),
         *_cold(data, published.scan, step, whole=True),
         1e3 * warm_seconds(lambda: reconstruct(scan, whole), repeats),
+        1e3 * _seconds_again(scan, network, repeats),
         published.convolution + published.regression + published.poisson,
     )
     return (known.name, raw, network_size(scan, step), *cells)
@@ -104,3 +108,11 @@ def cold_seconds(data: Data, name: str, step: float, whole: bool) -> float:
     else:
         reconstruct_network(scan, NetworkParameters(step=step))
     return perf_counter() - begin
+
+
+def _seconds_again(scan: Scan, parameters: NetworkParameters, repeats: int) -> float:
+    """Time to the network with other smoothing lengths, the scan having been made ready before."""
+    step = parameters.step or 0.0
+    reconstruction = NetworkReconstruction(scan, parameters)
+    choices = iter([Weights(step, 2 * step), Weights(1.1 * step, 2.2 * step)] * (repeats + 1))
+    return warm_seconds(lambda: reconstruction.solve(next(choices)), repeats)

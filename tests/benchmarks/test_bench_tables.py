@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import accuracy, growth, noisy, regression, surfacing, times
+from benchmarks import accuracy, growth, nodes, noisy, regression, surfacing, times
 from benchmarks.data import Data
 from benchmarks.report import read_report, record, write_report
 from benchmarks.table import Column, Table
@@ -85,6 +85,25 @@ def test_noisy_and_uncertainty() -> None:
     assert 0.2 < numbers(noisy.uncertainty(WITHOUT, ("leaf",), 1), 1)[0] < 5
 
 
+def test_nodes() -> None:
+    table = nodes.nodes(WITHOUT, ("leaf",))
+    assert [row[0] for row in table.rows] == ["leaf (built in), noisy", "all"]
+    assert table.rows[0][1:] == table.rows[1][1:]
+    assert 0.5 < float(table.rows[0][5] or 0) <= 1
+
+
+def test_meetings_are_matched_once_and_round_closed_curves() -> None:
+    scan = exact_scan(leaf(), 0.01)
+    true = nodes.marked_meetings(scan)
+    assert nodes.match_errors(scan, true, true) == [0.0] * len(true)
+    first = true[0]
+    assert scan.curves[first.curves[0]].closed
+    length = float(np.ptp(scan.curves[first.curves[0]].distance))
+    round_once = nodes.Meeting(first.curves, (first.places[0] - length + 0.01, first.places[1]))
+    assert nodes.match_errors(scan, [first, first], [round_once]) == pytest.approx([0.01])
+    assert nodes.match_errors(scan, [first], [nodes.Meeting((0, 99), first.places)]) == []
+
+
 def test_partners_of_an_exact_network_are_its_points() -> None:
     network = leaf().network(0.02)
     assert noisy.partners(network, leaf().network(0.002)) == pytest.approx(network.points, abs=2e-5)
@@ -93,7 +112,7 @@ def test_partners_of_an_exact_network_are_its_points() -> None:
 def test_times_and_regression() -> None:
     (row,) = times.times(WITHOUT, (96,), 1).rows
     assert 48 < int(row[2] or 0) < 192
-    assert all(isinstance(cell, float) and cell > 0 for cell in row[3:7])
+    assert all(isinstance(cell, float) and cell > 0 for cell in row[3:8])
     (row,) = regression.regression(WITHOUT, (96,), 1).rows
     assert float(row[3] or 0) > 0
     assert row[6] == "not installed" or abs(float(row[7] or 1)) < 1e-6

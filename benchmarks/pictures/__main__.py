@@ -1,0 +1,48 @@
+"""`python -m benchmarks.pictures [NAME ...]`: draw docs/pictures/algorithms/NAME.png, all when none is named."""
+
+import argparse
+import sys
+from collections.abc import Callable
+
+from matplotlib.figure import Figure
+
+from benchmarks.data import ROOT
+from benchmarks.pictures import curves, surfaces
+from benchmarks.pictures.canvas import save
+
+FOLDER = ROOT / "docs" / "pictures" / "algorithms"
+
+PICTURES: dict[str, Callable[[], Figure]] = {
+    "orientation": curves.orientation,
+    "cleaning": curves.cleaning,
+    "resampling": curves.resampling,
+    "regression": curves.regression,
+    "weights": curves.weights,
+    "positions": curves.positions,
+    "bias": curves.bias,
+    "uncertainty": curves.uncertainty,
+    "cell_complex": surfaces.cell_complex_picture,
+    "patches": surfaces.patches,
+    "surface": surfaces.surface,
+    "curvature": surfaces.curvature,
+    "refinement": surfaces.refinement,
+    "evaluation": surfaces.evaluation,
+    "simulation": curves.simulation,
+}
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.pictures", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(PICTURES)}")
+    chosen = parser.parse_args(arguments).names or list(PICTURES)
+    if unknown := sorted(set(chosen) - set(PICTURES)):
+        parser.error(f"no picture {', '.join(unknown)}: there are {', '.join(PICTURES)}")
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in chosen:
+        save(PICTURES[name](), FOLDER / f"{name}.png")
+        print(FOLDER / f"{name}.png")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,19 @@
+"""The pictures of the algorithms are drawn by code and belong to pages that exist."""
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("matplotlib", reason="matplotlib is installed by make bench alone")
+
+
+@pytest.mark.filterwarnings("ignore:.*deprecated:DeprecationWarning")
+def test_a_plot_and_a_surface_are_drawn(tmp_path: Path) -> None:
+    from benchmarks.pictures.__main__ import PICTURES
+    from benchmarks.pictures.canvas import save
+
+    for name in ("cleaning", "cell_complex"):
+        save(PICTURES[name](), tmp_path / f"{name}.png")
+        first = (tmp_path / f"{name}.png").read_bytes()
+        assert first.startswith(b"\x89PNG")
+        assert len(first) > 20_000
