@@ -57,7 +57,7 @@ def settle(curves: Sequence[FloatingCurve], poses: dict[int, Pose], contacts: Se
     Gauss-Newton on the distances and the angles between normals at all contacts, with headings and known places held by
     their standard deviations.
     """
-    placed, system = list(poses), _System(curves, list(poses), contacts)
+    placed, system = list(poses), _System(curves, list(poses), contacts, next(iter(poses.values())).shift)
     unknowns = np.concatenate(
         [*([p.turn, *p.shift] for p in poses.values()), [x for c in contacts for x in (c.s, c.t)]]
     )
@@ -80,8 +80,10 @@ def settle(curves: Sequence[FloatingCurve], poses: dict[int, Pose], contacts: Se
 class _System:
     """Residuals and their derivatives. Unknowns: per placed curve a turn and a shift, per contact two arc lengths."""
 
-    def __init__(self, curves: Sequence[FloatingCurve], placed: Sequence[int], contacts: Sequence[Contact]) -> None:
-        self._curves, self._placed, self._contacts = curves, placed, contacts
+    def __init__(
+        self, curves: Sequence[FloatingCurve], placed: Sequence[int], contacts: Sequence[Contact], origin: Floats
+    ) -> None:
+        self._curves, self._placed, self._contacts, self._origin = curves, placed, contacts, origin
         self._first = np.array([c.s for c in contacts]), np.array([c.t for c in contacts])
         self._known = [(k, side) for k, c in enumerate(contacts) for side in (0, 1) if (c.known_s, c.known_t)[side]]
 
@@ -128,6 +130,7 @@ class _System:
         jacobian = np.zeros((len(residual), len(unknowns)))
         residual[:count] = unknowns[: 4 * count : 4] / HEADING
         jacobian[np.arange(count), 4 * np.arange(count)] = 1 / HEADING
+        residual[count : count + 3] = (unknowns[1:4] - self._origin) / _KNOWN
         jacobian[count + np.arange(3), 1 + np.arange(3)] = 1 / _KNOWN
         for row, (k, side) in enumerate(self._known, count + 3):
             curve = self._curves[(self._contacts[k].a, self._contacts[k].b)[side]]

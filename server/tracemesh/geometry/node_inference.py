@@ -20,7 +20,7 @@ from tracemesh.geometry.loops import place_loop
 from tracemesh.geometry.scan import CurveScan, Scan
 
 _SURE = 0.95
-_LIKELY = 0.5
+_LIKELY = 0.3
 _APART = 0.03
 """m along both curves; nearer crossings of the same two curves are one."""
 _SAME = 0.005
@@ -86,6 +86,7 @@ class _Search:
         self.contacts: list[Contact] = []
         start = _start(scan, curves)
         self.poses: dict[int, Pose] = {start: Pose(0.0, np.zeros(3))}
+        self._trust = np.ones(len(curves))
         self._follow_marks()
 
     def _follow_marks(self) -> None:
@@ -113,21 +114,22 @@ class _Search:
         chosen = [f for k, f in enumerate(found) if f[1].confidence > (_LIKELY if k == 0 else _SURE)]
         for i, attachment in chosen:
             self.poses[i] = attachment.pose
+            ends = places.curve[[attachment.first, attachment.last]]
+            self._trust[i] = attachment.confidence * self._trust[ends].min()
             for end, row in ((0.0, attachment.first), (self._curves[i].length, attachment.last)):
                 on, at = int(places.curve[row]), float(places.arc[row])
-                self.contacts.append(Contact(i, end, on, at, attachment.confidence, known_s=True))
+                self.contacts.append(Contact(i, end, on, at, float(self._trust[i]), known_s=True))
         self._follow_marks()
         return bool(chosen)
 
     def place_a_loop(self) -> bool:
         """Place the closed curve with the strongest evidence; says whether there was one."""
-        loose = [c for i, c in enumerate(self._curves) if not c.closed and i not in self.poses]
         loops = [i for i, c in enumerate(self._curves) if c.closed and i not in self.poses]
-        found = [(i, p) for i in loops if (p := place_loop(self._curves[i], self._curves, self.poses, loose))]
+        found = [(i, p) for i in loops if (p := place_loop(i, self._curves, self.poses, self.contacts))]
         if not found:
             return False
         index, best = max(found, key=lambda f: f[1].evidence)
-        self.poses[index] = best.pose
+        self.poses[index], self._trust[index] = best.pose, best.confidence
         self._follow_marks()
         return True
 
@@ -136,8 +138,10 @@ class _Search:
         for _ in range(_ROUNDS):
             self._add_crossings()
             if self.contacts:
-                settled = settle(self._curves, self.poses, self.contacts)
-                self.poses, self.contacts = settled.poses, list(settled.contacts)
+                between = [c for c in self.contacts if c.a != c.b]
+                settled = settle(self._curves, self.poses, between)
+                within = [c for c in self.contacts if c.a == c.b]
+                self.poses, self.contacts = settled.poses, [*settled.contacts, *within]
 
     def _add_crossings(self) -> None:
         placed = sorted(self.poses)
@@ -145,7 +149,8 @@ class _Search:
             for b in placed[k + 1 :]:
                 for found in find_crossings(self._curves[a], self.poses[a], self._curves[b], self.poses[b]):
                     odds = crossing_odds(found)
-                    contact = Contact(a, found.s, b, found.t, odds / (1 + odds))
+                    confidence = odds / (1 + odds) * min(self._trust[a], self._trust[b])
+                    contact = Contact(a, found.s, b, found.t, float(confidence))
                     if odds > 1 and not any(self._is_same(contact, c) for c in self.contacts):
                         self.contacts.append(contact)
 
@@ -176,7 +181,7 @@ def _marked_contacts(scan: Scan, curves: Sequence[FloatingCurve]) -> list[Contac
             arc = float(np.clip(scanned.distance[sample] - curve.start, 0.0, curve.length))
             if int(node) not in first:
                 first[int(node)] = index, arc
-            elif first[int(node)][0] != index:
+            else:
                 other, at = first[int(node)]
                 contacts.append(Contact(other, at, index, arc, 1.0, known_s=True, known_t=True, node=int(node)))
     return contacts
@@ -202,16 +207,21 @@ def _share_a_place(one: Contact, other: Contact, curves: Sequence[FloatingCurve]
 
 
 def _proposal(scan: Scan, curves: Sequence[FloatingCurve], group: Sequence[Contact]) -> NodeProposal:
-    arcs: dict[int, list[float]] = {}
-    for contact in group:
-        arcs.setdefault(contact.a, []).append(contact.s)
-        arcs.setdefault(contact.b, []).append(contact.t)
-    places = []
-    for i, found in sorted(arcs.items()):
-        middle = found[0] + float(np.mean(curves[i].apart(np.array(found), found[0])))
-        places.append((i, int(np.abs(scan.curves[i].distance - curves[i].start - middle).argmin())))
+    ends = sorted({(i, arc) for c in group for i, arc in ((c.a, c.s), (c.b, c.t))})
+    clusters: list[tuple[int, list[float]]] = []
+    for i, arc in ends:
+        if not clusters or clusters[-1][0] != i or abs(curves[i].apart(arc, clusters[-1][1][0])) > _APART:
+            clusters.append((i, []))
+        clusters[-1][1].append(arc)
+    places = [(i, _sample(scan.curves[i], curves[i], arcs)) for i, arcs in clusters]
     numbers = [c.node for c in group if c.node is not None]
     return NodeProposal(tuple(places), min(c.confidence for c in group), min(numbers, default=None))
+
+
+def _sample(scanned: CurveScan, curve: FloatingCurve, arcs: Sequence[float]) -> int:
+    """The sample nearest to the middle of arc lengths, m, that belong together."""
+    middle = arcs[0] + float(np.mean(curve.apart(np.array(arcs), arcs[0])))
+    return int(np.abs(scanned.distance - curve.start - middle).argmin())
 
 
 def _marked(curve: CurveScan, marks: Sequence[tuple[int, int]]) -> CurveScan:
