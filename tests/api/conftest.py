@@ -114,10 +114,12 @@ def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[
         thread.join()
 
 
-@pytest.fixture(scope="module")
-def server(start_server: Callable[..., RunningServer]) -> RunningServer:
-    """A server with default settings, shared by the tests of a module."""
-    return start_server()
+@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+def server(
+    request: pytest.FixtureRequest, start_server: Callable[..., RunningServer], new_database: Callable[[str], str]
+) -> RunningServer:
+    """A server with default settings on a database of each kind, shared by the tests of a module."""
+    return start_server(database_url=new_database(request.param))
 
 
 @dataclass

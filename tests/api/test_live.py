@@ -11,7 +11,7 @@ import pytest
 from tracemesh.api.live.drawing import SPACING
 
 
-def watch(socket: Any, until: Callable[[dict[str, Any]], bool], limit: int = 400) -> list[dict[str, Any]]:
+def watch(socket: Any, until: Callable[[dict[str, Any]], bool], limit: int = 150) -> list[dict[str, Any]]:
     """Messages up to and including the first that fits."""
     seen: list[dict[str, Any]] = []
     for _ in range(limit):
@@ -154,7 +154,7 @@ def test_health_tells_who_measures(server: Any, ride: Any) -> None:
 def test_a_browser_that_does_not_read_delays_nobody(server: Any, ride: Any, line: Any) -> None:
     """Megabytes are drawn while one browser reads nothing; afterwards it gets the present state, not the backlog."""
     session = server.new_session()
-    with server.connect(f"/sessions/{session}/live", max_queue=1) as sleepy:
+    with server.connect(f"/sessions/{session}/live", max_queue=1, close_timeout=0.1) as sleepy:
         rider = ride("fast", session)
         messages = line(5000, block=500)
         for message in messages:
