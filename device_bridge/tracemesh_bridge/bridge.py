@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import NoReturn
 
-from tracemesh_bridge.clock import Clock
 from tracemesh_bridge.console import Console, typed
 from tracemesh_bridge.errors import BridgeError, OperatorMistake, SpoolError
-from tracemesh_bridge.health import Health
+from tracemesh_bridge.health import Host
 from tracemesh_bridge.keys import KEYS_HELP, Command, Discard, EndCurve, KeyParser, MarkNode, Quit, StartCurve, Undo
 from tracemesh_bridge.recorder import Recorder
 from tracemesh_bridge.source import Reading, Source
@@ -24,14 +23,13 @@ TICK = 0.1
 class Bridge:
     """One device, recorded into one spool, which is uploaded while it grows."""
 
-    def __init__(self, source: Source, spool: Spool, uplink: Uplink, health: Health, console: Console) -> None:
-        """`uplink` sends `spool`; `source` tells `health` how it does."""
+    def __init__(self, source: Source, spool: Spool, uplink: Uplink, host: Host, console: Console) -> None:
+        """`uplink` sends `spool`; `source` tells `host` how it does."""
         self._source = source
         self._spool = spool
         self._uplink = uplink
-        self._health = health
+        self._host = host
         self._console = console
-        self._clock = Clock()
         self._recorder = Recorder(spool)
         self._keys = KeyParser()
         self._stop = asyncio.Event()
@@ -164,7 +162,9 @@ class Bridge:
             f"curve {progress.curve}: {progress.samples} samples, nodes {nodes or '-'}" if progress.open else "no curve"
         )
         waiting = self._spool.next_seq - self._uplink.acknowledged
-        return f"{self._health.describe(self._clock.now())} | {curve} | {waiting} to send | {self._keys.digits}"
+        return (
+            f"{self._host.health.describe(self._host.clock.now())} | {curve} | {waiting} to send | {self._keys.digits}"
+        )
 
     @contextmanager
     def _signals(self) -> Iterator[None]:

@@ -2,10 +2,12 @@
 
 import math
 from collections import Counter, deque
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 from tracemesh.wire.base import Vector
-from tracemesh_bridge.source import Reading
+from tracemesh_bridge.clock import Clock
+from tracemesh_bridge.source import Link, Reading
 
 WINDOW_SECONDS = 2.0
 
@@ -71,6 +73,15 @@ class Health:
             f"|mag| {sum(math.hypot(*m) for _, m in pairs) / len(pairs):.3g}",
             f"dip {math.degrees(sum(dips) / len(dips)):.1f}°",
         ]
+
+
+@dataclass(frozen=True)
+class Host:
+    """What a source is given by the bridge: whom to tell how the connection and the readings do, and the time."""
+
+    link: Link
+    health: Health = field(default_factory=Health)
+    clock: Clock = field(default_factory=Clock)
 
 
 def dip(acceleration: Vector, magnetic: Vector) -> float:

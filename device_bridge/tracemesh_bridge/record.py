@@ -11,7 +11,7 @@ from pathlib import Path
 from tracemesh.wire.device import Device, Hello
 from tracemesh_bridge.bridge import Bridge, upload
 from tracemesh_bridge.console import Console
-from tracemesh_bridge.health import Health
+from tracemesh_bridge.health import Host
 from tracemesh_bridge.source import Link, Source
 from tracemesh_bridge.spool import Spool, exclusive, open_spools
 from tracemesh_bridge.uplink import Uplink
@@ -28,7 +28,7 @@ class Target:
     spool: Path
 
 
-def record(target: Target, device: Device, make_source: Callable[[Link, Health], Source]) -> bool:
+def record(target: Target, device: Device, make_source: Callable[[Host], Source]) -> bool:
     """Record a device until the operator quits; whether the server has everything then.
 
     Raises BridgeError if the spool cannot be used or the source cannot go on.
@@ -40,16 +40,14 @@ def record(target: Target, device: Device, make_source: Callable[[Link, Health],
         return asyncio.run(_record(target.server, spool, left_over, make_source))
 
 
-async def _record(
-    server: str, spool: Spool, left_over: list[Spool], make_source: Callable[[Link, Health], Source]
-) -> bool:
-    console, health = Console(), Health()
+async def _record(server: str, spool: Spool, left_over: list[Spool], make_source: Callable[[Host], Source]) -> bool:
+    console = Console()
 
     def uplink(spool: Spool, name: str) -> Uplink:
         return Uplink(server, os.environ.get(TOKEN_VARIABLE, ""), spool, Link(name, console.say))
 
-    source = make_source(Link("device", console.say), health)
-    bridge = Bridge(source, spool, uplink(spool, "server"), health, console)
+    host = Host(Link("device", console.say))
+    bridge = Bridge(make_source(host), spool, uplink(spool, "server"), host, console)
     uploads = [asyncio.ensure_future(upload(s, uplink(s, f"left-over {s.folder.name}"))) for s in left_over]
     try:
         return await bridge.run()

@@ -53,6 +53,10 @@ class Link:
             self._said = words
             self._say(f"{self.name}: {state}" + (f": {words}" if words else ""))
 
+    def note(self, words: str) -> None:
+        """Say something about the connection that does not change its state."""
+        self._say(f"{self.name}: {words}")
+
     def down(self, why: str) -> None:
         """The connection is gone, or could not be made: search again."""
         if self.state in (LinkState.LIVE, LinkState.STALE):

@@ -40,7 +40,7 @@ def add_recording_command(commands: Commands, name: str, words: str, run: Run) -
     option("--name", default="", help="name of the device for people")
     option(
         "--mounting", type=quaternion, default=(1.0, 0.0, 0.0, 0.0), metavar="W,X,Y,Z",
-        help="turns the axes (tangent, normal, B) into the device's own axes (default: 1,0,0,0)",
+        help="turns the axes (tangent, normal, B) into the device's own axes; the default is the device's usual one",
     )  # fmt: skip
     return command
 

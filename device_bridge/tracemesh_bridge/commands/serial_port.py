@@ -3,7 +3,6 @@
 import argparse
 
 from tracemesh.wire.device import Wheel
-from tracemesh_bridge.clock import Clock
 from tracemesh_bridge.commands.options import (
     Commands,
     add_command,
@@ -37,7 +36,7 @@ def _morphorider(args: argparse.Namespace) -> int:
     settings = MorphoriderSettings(args.port, args.rate, args.timeout, layout(args))
     wheel = Wheel(circumference=args.circumference, ticks_per_turn=settings.layout.ticks_per_turn)
     rider = device(args, "morphorider", wheel)
-    return not record(target(args), rider, lambda link, health: Morphorider(settings, rider, link, health, Clock()))
+    return not record(target(args), rider, lambda host: Morphorider(settings, rider, host))
 
 
 def _inspect(args: argparse.Namespace) -> int:

@@ -13,11 +13,10 @@ from dataclasses import dataclass, field
 import serial
 
 from tracemesh.wire.device import Device, Wheel
-from tracemesh_bridge.clock import Clock
 from tracemesh_bridge.errors import FrameError
 from tracemesh_bridge.framing import Frame, FrameLayout, decode
-from tracemesh_bridge.health import Health
-from tracemesh_bridge.source import Link, LinkState, Reading
+from tracemesh_bridge.health import Host
+from tracemesh_bridge.source import LinkState, Reading
 
 QUIET = 0.03
 """s without a byte after which a device is taken to have finished speaking."""
@@ -46,13 +45,12 @@ class MorphoriderSettings:
 class Morphorider:
     """The device as a source of readings."""
 
-    def __init__(self, settings: MorphoriderSettings, device: Device, link: Link, health: Health, clock: Clock) -> None:
-        """`device` goes into the recording's hello; `link` and `health` are told what happens."""
+    def __init__(self, settings: MorphoriderSettings, device: Device, host: Host) -> None:
+        """`device` goes into the recording's hello; the wheel in it is the one believed."""
         self.device = device
         self._settings = settings
-        self._link = link
-        self._health = health
-        self._clock = clock
+        self._host = host
+        self._link = host.link
         self._odometer = _Odometer(device.wheel or Wheel())
 
     def readings(self, stop: threading.Event) -> Iterator[Reading]:
@@ -71,10 +69,10 @@ class Morphorider:
             stop.wait(SEARCH_PERIOD)
 
     def _frames(self, line: serial.Serial, port: str, stop: threading.Event) -> Iterator[Reading]:
-        due = last_good = self._clock.now()
+        due = last_good = self._host.clock.now()
         while not stop.is_set():
             frame = self._ask(line)
-            now = self._clock.now()
+            now = self._host.clock.now()
             reading = self._believe(frame, now) if frame else None
             if reading:
                 last_good = now
@@ -91,17 +89,17 @@ class Morphorider:
     def _believe(self, frame: Frame, now: float) -> Reading | None:
         ticks = self._odometer.follow(frame.ticks, now)
         if ticks is None:
-            self._health.fault("implausible")
+            self._host.health.fault("implausible")
             return None
         reading = Reading(received=now, ticks=ticks, acceleration=frame.acceleration, magnetic=frame.magnetic)
-        self._health.take(reading)
+        self._host.health.take(reading)
         return reading
 
     def _ask(self, line: serial.Serial) -> Frame | None:
         """One request and its answer, or None and a counted fault."""
         layout = self._settings.layout
         if line.in_waiting:
-            self._health.fault("surplus")
+            self._host.health.fault("surplus")
             drain(line)
         line.write(bytes([layout.request]))
         data = line.read(layout.length)
@@ -109,7 +107,7 @@ class Morphorider:
             return decode(layout, data)
         except FrameError:
             whole = len(data) == layout.length
-            self._health.fault("implausible" if whole else "short" if data else "late")
+            self._host.health.fault("implausible" if whole else "short" if data else "late")
             drain(line)
             return None
 
