@@ -16,6 +16,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _WINDOW = 5  # samples of the running median
+_PASSES = 3
 _GATE = 4.0  # median absolute deviations (scaled to standard deviations) that a good sample may be away
 
 
@@ -105,28 +106,45 @@ def _vector_outliers(acceleration: Floats, magnetic: Floats) -> Bools:
     return result
 
 
-def _frame_outliers(quaternion: Floats) -> Bools:
-    """Samples (n,) whose frame stands out from the running median of their neighbours' (n, 4), signs aligned.
+def _median_of_five(a: Floats, b: Floats, c: Floats, d: Floats, e: Floats) -> Floats:
+    """Elementwise; six times as fast as numpy's median."""
+    low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    result: Floats = np.maximum(np.minimum(low, e), np.minimum(np.maximum(low, e), high))
+    return result
 
-    Both the curve's own noise and the local change set the scale: a sharp bend is no outlier.
+
+def _frame_outliers(frames: Floats) -> Bools:
+    """Samples (n,) whose frame (n, 3, 3) stands out from the running median of itself and two neighbours on each side.
+
+    Both the curve's own noise and the local change set the scale: a sharp bend is no outlier. Matrices, not
+    quaternions: no sign has to be carried across an outlier.
     """
-    if len(quaternion) < _WINDOW:
-        return np.zeros(len(quaternion), bool)
+    n = len(frames)
+    if n < _WINDOW:
+        return np.zeros(n, bool)
     half = _WINDOW // 2
-    padded = np.concatenate([np.repeat(quaternion[:1], half, 0), quaternion, np.repeat(quaternion[-1:], half, 0)])
-    windows = np.lib.stride_tricks.sliding_window_view(padded, _WINDOW, axis=0)
-    median = np.median(windows, axis=-1)
-    deviation = np.linalg.norm(quaternion - median, axis=1)
-    local = np.median(np.linalg.norm(windows - median[..., None], axis=1), axis=-1)
+    columns = frames[:, :, :2].reshape(n, 6)
+    padded = np.concatenate([columns[2 * half : half : -1], columns, columns[-half - 2 : -2 * half - 2 : -1]])
+    shifted = [padded[i : i + n] for i in range(_WINDOW)]
+    median = _median_of_five(*shifted)
+    distances = [np.linalg.norm(other - median, axis=1) for other in shifted]
+    deviation, local = distances[half], _median_of_five(*distances)
     result: Bools = (deviation > 1.5 * _GATE * _robust_scale(deviation) + 1e-9) & (deviation > _GATE * local)
     return result
 
 
-def outliers(curve: CurveScan, quaternion: Floats) -> Bools:
-    """Samples (n,) of a curve that no average should contain; quaternion: (n, 4) of its frames, signs aligned."""
-    bad = _frame_outliers(quaternion)
+def outliers(curve: CurveScan, frames: Floats) -> Bools:
+    """Samples (n,) of a curve that no average should contain; frames: (n, 3, 3), the curve's own."""
+    bad = np.zeros(len(frames), bool)
     if curve.acceleration is not None and curve.magnetic is not None:
-        bad |= _vector_outliers(curve.acceleration, curve.magnetic)
+        bad = _vector_outliers(curve.acceleration, curve.magnetic)
+    for _ in range(_PASSES):  # outliers in a row hide each other from the median
+        kept = np.flatnonzero(~bad)
+        found = _frame_outliers(frames[kept])
+        bad[kept[found]] = True
+        if not found.any():
+            break
     return bad if np.count_nonzero(~bad) >= 2 else np.zeros_like(bad)
 
 
@@ -145,12 +163,11 @@ def clean_curve(curve: CurveScan, index: int) -> CleanCurve:
     """One orientation per distance along a curve; raises ScanError, naming the curve, where that cannot be."""
     name = curve_name(index)
     _check(curve, name)
-    frames = darboux_frames(normalized(curve.tangent), curve.normal)
-    quaternion = align_signs(matrix_to_quaternion(frames))
-    bad = outliers(curve, quaternion)
+    frames = darboux_frames(curve.tangent, curve.normal)
+    bad = outliers(curve, frames)
     keep = ~bad
     distance = curve.distance[keep]
-    kept = align_signs(quaternion[keep])
+    kept = align_signs(matrix_to_quaternion(frames[keep]))
     unique, values = merge_duplicates(distance, np.hstack([kept, normalized(curve.tangent[keep])]))
     if len(unique) < 2:
         raise ScanError(f"{name} has no length once its outliers are left out")

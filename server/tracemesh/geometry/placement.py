@@ -1,7 +1,7 @@
 """Cleaned curves cut to their nodes: what begins and ends where, before anything is resampled."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +51,8 @@ def _with_ends(curve: CleanCurve) -> tuple[Floats, Ints]:
     low, high = curve.distance[0], curve.distance[-1]
     least = _SHORTEST_END * (high - low)
     before, after = not len(marks) or low + least < marks[0], not len(marks) or high - least > marks[-1]
-    marks = np.concatenate([[low] * before, marks, [high] * after])
-    return marks, np.concatenate([[_LOOSE] * before, nodes, [_LOOSE] * after]).astype(np.int64)
+    marks = np.concatenate([[low] * int(before), marks, [high] * int(after)])
+    return marks, np.concatenate([[_LOOSE] * int(before), nodes, [_LOOSE] * int(after)]).astype(np.int64)
 
 
 def _place_open(curve: CleanCurve) -> PlacedCurve:
@@ -103,7 +103,7 @@ def place_curve(curve: CleanCurve) -> PlacedCurve:
 
 
 def number_nodes(curves: Sequence[PlacedCurve]) -> tuple[list[Ints], Bools]:
-    """Dense node numbers per curve, in the order of the scanned ones, and which of them are nodes of the network (k,).
+    """Dense node numbers per curve, in the order of the scanned ones; which (k,) of them are nodes of the network.
 
     Loose ends come after the marked nodes. Both ends of a closed curve without nodes are one number, but no node.
     """
@@ -145,6 +145,21 @@ def uniform_layout(curves: Sequence[PlacedCurve], step: float) -> Layout:
         arcs.append(np.interp(np.arange(ends[-1] + 1), ends, curve.marks))
         marks.append(ends)
     return _layout(curves, arcs, marks)
+
+
+def moved_layout(layout: Layout, curves: Sequence[PlacedCurve]) -> Layout:
+    """The same rows on curves whose marks have moved: as evenly spread over every segment as before."""
+    marks = np.concatenate([c.marks for c in curves])
+    return replace(layout, arc=_spread(layout, marks))
+
+
+def _spread(layout: Layout, marks: Floats) -> Floats:
+    """Arc lengths (n,), m, of rows that share segments as in a layout, for other arcs of its marks (m,)."""
+    start, end = layout.segment_rows[layout.row_segment].T
+    share = (layout.arc - layout.arc[start]) / (layout.arc[end] - layout.arc[start])
+    mark = layout.segments[layout.row_segment]
+    result: Floats = (1 - share) * marks[mark] + share * marks[mark + 1]
+    return result
 
 
 def measured_layout(curves: Sequence[PlacedCurve]) -> Layout:

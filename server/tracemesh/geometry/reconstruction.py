@@ -16,12 +16,13 @@ from tracemesh.geometry.correction import correct_curves
 from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.network_report import bias_report, fit_warnings
-from tracemesh.geometry.placement import PlacedCurve, measured_layout, place_curve, uniform_layout
+from tracemesh.geometry.placement import PlacedCurve, measured_layout, moved_layout, place_curve, uniform_layout
 from tracemesh.geometry.polyline import MeasuredNetwork, measure_network, points_on_polyline
 from tracemesh.geometry.positions import Positions, check_connected, solve_positions
 from tracemesh.geometry.quadrature import edge_vectors
 from tracemesh.geometry.regression import Regression, RegressionSolver
 from tracemesh.geometry.resampling import resample
+from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.samples import Layout, NetworkSamples
 from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.uncertainty import point_uncertainty
@@ -123,6 +124,7 @@ class NetworkReconstruction:
 
     def _close(self, curves: Sequence[PlacedCurve], samples: NetworkSamples) -> NetworkSamples:
         """Samples of curves freed from their errors as a whole, if they have any; a polyline is exact as it is."""
+        self._start = self._choice.frames
         if self._measured.is_polyline:
             return samples
         mode = self._parameters.curve_bias
@@ -130,14 +132,15 @@ class NetworkReconstruction:
         if not self._closing.variances.with_bias:
             return samples
         corrected = correct_curves(curves, self._closing.corrections)
-        return resample(corrected, uniform_layout(corrected, self._step), self._step)
+        self._start = exp(self._closing.corrections.rotation)[samples.layout.curve] @ self._choice.frames
+        return resample(corrected, moved_layout(samples.layout, corrected), self._step)
 
     def solve(self, weights: Weights | None = None) -> NetworkResult:
         """The network, smoothed with the chosen weights or with others; the latter starts from the solution before."""
         layout = self._samples.layout
         used = weights or _weights(self._parameters, self._choice.weights)
         self._stages.begin("smoothing")
-        regression = self._solver.solve(self._samples.frames, used)
+        regression = self._solver.solve(self._samples.frames, used, self._start)
         self._stages.begin("positions")
         positions = self._positions(layout, regression.frames)
         self._stages.begin("uncertainty")

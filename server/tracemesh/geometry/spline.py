@@ -20,6 +20,7 @@ from tracemesh.geometry.samples import NetworkSamples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bands = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,10 @@ class Offsets:
     row: Ints
     fraction: Floats
     weight: Floats
+
+    def part(self, chosen: Ints) -> "Offsets":
+        """Only some of the samples."""
+        return Offsets(self.value[chosen], self.row[chosen], self.fraction[chosen], self.weight[chosen])
 
     def predicted(self, offset: Floats) -> Floats:
         """Offsets (n, 3) at rows, interpolated at the measured samples (m, 3)."""
@@ -67,14 +72,9 @@ class DevelopedSpline:
         self._samples = samples
         self._rate = log(samples.frames[self._edge + 1] @ np.swapaxes(samples.frames[self._edge], 1, 2))
         self._rate /= self._h[:, None]
-        inner = np.flatnonzero(np.diff(self._edge) == 1)
-        self._centre = self._edge[inner] + 1
-        before, after = self._h[inner], self._h[inner + 1]
-        self._bend_weight = 2 / (before + after)
-        self._bend_stencil = np.stack([1 / before, -1 / before - 1 / after, 1 / after])
-        self._bend = self._rate[inner + 1] - self._rate[inner]
+        self._stretch, self._bend = self._stretching(), self._bending()
 
-    def data_band(self, offsets: Offsets, weight: Floats) -> tuple[Floats, Floats]:
+    def data_band(self, offsets: Offsets, weight: Floats) -> Bands:
         """Normal matrix (3, n), upper banded, and right-hand side (n, 3) of measured offsets with weights (m,)."""
         n, row, f = self._n, offsets.row, offsets.fraction
         band = np.zeros((3, n))
@@ -86,26 +86,37 @@ class DevelopedSpline:
             right[:, axis] = np.bincount(row, value * (1 - f), n) + np.bincount(row + 1, value * f, n)
         return band, right
 
-    def penalty_band(self, weights: Weights) -> tuple[Floats, Floats]:
-        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the stretching and bending terms."""
-        n, edge = self._n, self._edge
-        stretch, bend = weights.stretch**2, weights.bend**4
-        band, right = np.zeros((3, n)), np.zeros((n, 3))
-        band[2] = np.bincount(edge, stretch / self._h, n) + np.bincount(edge + 1, stretch / self._h, n)
-        band[1, edge + 1] = -stretch / self._h
-        right[edge] += stretch * self._rate
-        right[edge + 1] -= stretch * self._rate
-        weight, rows = bend * self._bend_weight, (self._centre - 1, self._centre, self._centre + 1)
-        a, b, c = self._bend_stencil
-        for at, coefficient in zip(rows, self._bend_stencil, strict=True):
-            band[2, at] += weight * coefficient**2
-            right[at] -= (weight * coefficient)[:, None] * self._bend
-        band[1, rows[1]] += weight * a * b
-        band[1, rows[2]] += weight * b * c
-        band[0, rows[2]] += weight * a * c
+    def _stretching(self) -> Bands:
+        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the stretching term of weight 1."""
+        band, right, edge, h = np.zeros((3, self._n)), np.zeros((self._n, 3)), self._edge, self._h
+        band[2] = np.bincount(edge, 1 / h, self._n) + np.bincount(edge + 1, 1 / h, self._n)
+        band[1, edge + 1] = -1 / h
+        right[edge] += self._rate
+        right[edge + 1] -= self._rate
         return band, right
 
-    def solve(self, data: tuple[Floats, Floats], penalty: tuple[Floats, Floats]) -> Floats:
+    def _bending(self) -> Bands:
+        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the bending term of weight 1."""
+        band, right = np.zeros((3, self._n)), np.zeros((self._n, 3))
+        inner = np.flatnonzero(np.diff(self._edge) == 1)
+        centre, before, after = self._edge[inner] + 1, self._h[inner], self._h[inner + 1]
+        weight, (a, b, c) = 2 / (before + after), (1 / before, -1 / before - 1 / after, 1 / after)
+        bend = weight[:, None] * (self._rate[inner + 1] - self._rate[inner])
+        for at, coefficient in ((centre - 1, a), (centre, b), (centre + 1, c)):
+            band[2, at] += weight * coefficient**2
+            right[at] -= coefficient[:, None] * bend
+        band[1, centre] += weight * a * b
+        band[1, centre + 1] += weight * b * c
+        band[0, centre + 1] += weight * a * c
+        return band, right
+
+    def penalty_band(self, weights: Weights) -> Bands:
+        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the stretching and bending terms."""
+        stretch, bend = weights.stretch**2, weights.bend**4
+        band, right = (stretch * s + bend * b for s, b in zip(self._stretch, self._bend, strict=True))
+        return band, right
+
+    def solve(self, data: Bands, penalty: Bands) -> Floats:
         """Offsets (n, 3), rad, of the smooth frames from the resampled ones."""
         result: Floats = solveh_banded(data[0] + penalty[0], data[1] + penalty[1], check_finite=False)
         return result

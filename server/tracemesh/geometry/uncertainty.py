@@ -16,28 +16,29 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _MOST, _FEWEST = 64, 16  # draws: a standard deviation is then known to 9 % and 18 %
+_ROWS = 250  # at which draws are looked at; what they show is smooth between nodes
 _NUMBERS = 3_000_000  # to hold at once
 _SEED = 0
 
 
-def _shares(layout: Layout) -> Floats:
-    """How far (n,) each row is on the way from its segment's start (0) to its end (1)."""
-    start = layout.segment_rows[:, 0][layout.row_segment]
-    result: Floats = (layout.arc - layout.arc[start]) / layout.segment_lengths[layout.row_segment]
+def _share(layout: Layout, rows: Ints) -> Floats:
+    """How far (k,) rows (k,) are on the way from their segment's start (0) to its end (1)."""
+    segment = layout.row_segment[rows]
+    result: Floats = (layout.arc[rows] - layout.arc[layout.segment_rows[segment, 0]]) / layout.segment_lengths[segment]
     return result
 
 
-def _deviations(layout: Layout, points: Floats, tangent: Floats, drawn: Corrections) -> Floats:
-    """Deviations (k, n, 3), m, of points (n, 3) with unit tangents (n, 3) at k draws of the corrections."""
-    segment = layout.row_segment
+def _deviations(layout: Layout, rows: Ints, points: Floats, tangent: Floats, drawn: Corrections) -> Floats:
+    """Deviations (d, k, 3), m, at rows (k,) of points (n, 3) with unit tangents (n, 3), for d drawn corrections."""
+    segment, curve = layout.row_segment[rows], layout.curve[rows]
     first, last = layout.segment_rows[segment].T
-    t = _shares(layout)[:, None]
+    t = _share(layout, rows)[:, None]
     mark, (a, b) = layout.segments[segment], layout.segment_nodes[segment].T
     before, after = (1 - t) * drawn.shift[:, mark, None], t * drawn.shift[:, mark + 1, None]
     ends = (1 - t) * drawn.nodes[:, a] + t * drawn.nodes[:, b] - before * tangent[first] - after * tangent[last]
-    bulge = points - (1 - t) * points[first] - t * points[last]
-    turned = np.cross(drawn.rotation[:, layout.curve], bulge) + drawn.scale[:, layout.curve, None] * bulge
-    result: Floats = ends + turned + (before + after) * tangent
+    bulge = points[rows] - (1 - t) * points[first] - t * points[last]
+    turned = np.cross(drawn.rotation[:, curve], bulge) + drawn.scale[:, curve, None] * bulge
+    result: Floats = ends + turned + (before + after) * tangent[rows]
     return result
 
 
@@ -57,10 +58,12 @@ def point_uncertainty(adjustment: Adjustment, layout: Layout, points: Floats, ta
 
     tangent: (n, 3). walk: (c,) m, variance per metre and axis of each curve's positions.
     """
-    count = int(np.clip(_NUMBERS // (3 * layout.size), _FEWEST, _MOST))
+    rows = np.union1d(layout.marks, np.linspace(0, layout.size - 1, _ROWS).astype(np.int64))
+    count = int(np.clip(_NUMBERS // (3 * len(rows)), _FEWEST, _MOST))
     drawn = adjustment.draws(count, np.random.default_rng(_SEED))
-    moved = _without_motion(_deviations(layout, points, tangent, drawn), points)
-    t = _shares(layout)
+    moved = _without_motion(_deviations(layout, rows, points, tangent, drawn), points[rows])
+    common = np.interp(np.arange(layout.size), rows, np.sum(moved**2, axis=2).mean(axis=0))
+    t = _share(layout, np.arange(layout.size))
     bridge = 3 * walk[layout.curve] * layout.segment_lengths[layout.row_segment] * t * (1 - t)
-    result: Floats = np.sqrt(np.sum(moved**2, axis=2).mean(axis=0) + bridge)
+    result: Floats = np.sqrt(common + bridge)
     return result

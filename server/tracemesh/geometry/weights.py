@@ -14,11 +14,10 @@ from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.misclosure import NoiseLevel
 from tracemesh.geometry.placement import PlacedCurve
 from tracemesh.geometry.samples import NetworkSamples
-from tracemesh.geometry.spline import DevelopedSpline, Offsets, measured_offsets
+from tracemesh.geometry.spline import Bands, DevelopedSpline, Offsets, measured_offsets
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Bands = tuple[Floats, Floats]
 
 _FOLDS = 5
 _RUNS_PER_STEP = 4
@@ -55,21 +54,22 @@ class _Trials:
     """Prediction error of weights, remembered."""
 
     def __init__(self, spline: DevelopedSpline, offsets: Offsets, fold: Ints) -> None:
-        self._spline, self._offsets, self._fold = spline, offsets, fold
+        self._spline, self._count = spline, max(1, int(np.count_nonzero(fold >= 0)))
         more = _FOLDS / (_FOLDS - 1)
         self._data: list[Bands] = []
+        self._left_out: list[Offsets] = []
         for left_out in range(_FOLDS):
             factor = np.where(fold < 0, 1.0, np.where(fold == left_out, 0.0, more))
             self._data.append(spline.data_band(offsets, offsets.weight * factor))
+            self._left_out.append(offsets.part(np.flatnonzero(fold == left_out)))
 
     def error(self, weights: Weights) -> float:
         """Root mean square rotation error per axis, rad, of predicted left-out frames."""
         penalty = self._spline.penalty_band(weights)
         total = 0.0
-        for left_out, data in enumerate(self._data):
-            missed = self._offsets.predicted(self._spline.solve(data, penalty)) - self._offsets.value
-            total += float(np.sum(missed[self._fold == left_out] ** 2))
-        return float(np.sqrt(total / max(1, 3 * int(np.count_nonzero(self._fold >= 0)))))
+        for left_out, data in zip(self._left_out, self._data, strict=True):
+            total += float(np.sum((left_out.predicted(self._spline.solve(data, penalty)) - left_out.value) ** 2))
+        return float(np.sqrt(total / (3 * self._count)))
 
 
 def _vertex(logs: list[float], errors: list[float]) -> float:

@@ -1,0 +1,153 @@
+"""Regression on SO(3): derivatives, scipy's minimiser as oracle, nodes, warm starts, independence of the step."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from tracemesh.geometry.cleaning import clean_curves
+from tracemesh.geometry.energy import EnergyPoint, Weights, pattern_of
+from tracemesh.geometry.placement import place_curve, uniform_layout
+from tracemesh.geometry.regression import RegressionSolver
+from tracemesh.geometry.resampling import resample
+from tracemesh.geometry.rotations import exp, log
+from tracemesh.geometry.samples import NetworkSamples
+from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.stencil import Stencil
+
+WEIGHTS = Weights(stretch=0.05, bend=0.08)
+
+
+def noisy_samples(name: str, step: float, noise: float = 0.1, seed: int = 0) -> NetworkSamples:
+    curves = [place_curve(c) for c in clean_curves(exact_scan(SHAPES[name](), step / 4).curves)]
+    samples = resample(curves, uniform_layout(curves, step), step)
+    turns = exp(noise * np.random.default_rng(seed).standard_normal((samples.layout.size, 3)))
+    return NetworkSamples(samples.layout, samples.frames @ turns)
+
+
+def residuals(frames: np.ndarray, data: np.ndarray, stencil: Stencil, weights: Weights) -> np.ndarray:
+    """The energy's terms one by one, as Eq. 3.27 states them, for an independent least-squares solver."""
+    x, parts = frames, []
+    for k in range(stencil.size):
+        parts.append(np.sqrt(stencil.data[k]) * (x[k] - data[k]))
+    for left, right, h in zip(stencil.left, stencil.right, stencil.h, strict=True):
+        parts.append(weights.stretch / np.sqrt(h) * (x[left] - x[right]))
+    for k, (b, c, a) in enumerate(zip(stencil.before, stencil.centre, stencil.after, strict=True)):
+        m = x[c].T @ (x[a] / stencil.h_out[k] + x[b] / stencil.h_in[k])
+        parts.append(weights.bend**2 / np.sqrt((stencil.h_in[k] + stencil.h_out[k]) / 2) * (m - m.T) / 2)
+    for p, q in stencil.pair:
+        parts.append(np.sqrt(stencil.stiffness / 3) * np.tile(x[p][:, 1] - x[q][:, 1], (3, 1)))
+    return np.concatenate([p.ravel() for p in parts])
+
+
+@pytest.mark.parametrize("name", ["leaf", "egg"])
+def test_value_is_the_sum_of_the_terms(name: str) -> None:
+    samples = noisy_samples(name, 0.05)
+    stencil = Stencil(samples.layout)
+    x = samples.frames[stencil.representative]
+    data = x @ exp(0.2 * np.random.default_rng(5).standard_normal((len(x), 3)))
+    expected = np.sum(residuals(x, data, stencil, WEIGHTS) ** 2)
+    assert EnergyPoint(stencil, x, data, WEIGHTS).value == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["leaf", "egg"])
+def test_gradient_is_the_derivative_of_the_value(name: str) -> None:
+    samples = noisy_samples(name, 0.08)
+    stencil = Stencil(samples.layout)
+    random = np.random.default_rng(1)
+    data = samples.frames[stencil.representative]
+    x = data @ exp(0.3 * random.standard_normal((len(data), 3)))
+    gradient = EnergyPoint(stencil, x, data, WEIGHTS).gradient()
+    for _ in range(5):
+        w = random.standard_normal((len(x), 3))
+        ahead, behind = (EnergyPoint(stencil, x @ exp(e * w), data, WEIGHTS).value for e in (1e-5, -1e-5))
+        assert np.sum(gradient * w) == pytest.approx((ahead - behind) / 2e-5, rel=1e-6)
+
+
+def test_hessian_is_the_second_derivative_where_residuals_of_bends_and_nodes_vanish() -> None:
+    samples = noisy_samples("leaf", 0.08)
+    stencil = Stencil(samples.layout)
+    random = np.random.default_rng(2)
+    data = samples.frames[stencil.representative]
+    x = np.broadcast_to(exp(np.array([0.4, 1.0, 0.2])), data.shape).copy()
+    pattern = pattern_of(stencil)
+    pattern.matrix.data = pattern.entries(EnergyPoint(stencil, x, data, WEIGHTS).hessian_blocks())
+    upper = pattern.matrix.toarray()
+    full = upper + upper.T - np.diag(np.diag(upper))
+    w = random.standard_normal(3 * len(x))
+    turn = w.reshape(-1, 3)
+    values = [EnergyPoint(stencil, x @ exp(e * turn), data, WEIGHTS).value for e in (1e-3, 0.0, -1e-3)]
+    assert w @ full @ w == pytest.approx((values[0] - 2 * values[1] + values[2]) / 1e-6, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ["leaf", "egg"])
+def test_the_minimum_is_the_one_that_scipy_finds(name: str) -> None:
+    samples = noisy_samples(name, 0.1)
+    found = RegressionSolver(samples.layout).solve(samples.frames, WEIGHTS)
+    stencil = Stencil(samples.layout)
+    data = samples.frames[stencil.representative]
+
+    def vector(w: np.ndarray) -> np.ndarray:
+        return residuals(data @ exp(w.reshape(-1, 3)), data, stencil, WEIGHTS)
+
+    oracle = least_squares(vector, np.zeros(3 * len(data)), xtol=1e-12, ftol=1e-14, gtol=1e-12)
+    assert found.energy == pytest.approx(2 * oracle.cost, rel=1e-6)
+    there = data @ exp(oracle.x.reshape(-1, 3))
+    turned = np.linalg.norm(log(np.swapaxes(there[stencil.row], 1, 2) @ found.frames), axis=1)
+    assert turned.max() < 1e-4
+
+
+@pytest.mark.parametrize("weights", [WEIGHTS, Weights(0.0, 0.5), Weights(0.0, 0.02), Weights(1.0, 1.0)])
+def test_normals_agree_at_nodes_and_frames_are_rotations(weights: Weights) -> None:
+    samples = noisy_samples("leaf", 0.02, noise=0.05)
+    layout = samples.layout
+    frames = RegressionSolver(layout).solve(samples.frames, weights).frames
+    np.testing.assert_allclose(np.swapaxes(frames, 1, 2) @ frames, np.broadcast_to(np.eye(3), frames.shape), atol=1e-12)
+    normals = frames[layout.marks, :, 1]
+    for node in range(layout.node_count):
+        own = normals[layout.nodes == node]
+        assert np.degrees(np.arcsin(np.linalg.norm(np.cross(own, own[:1]), axis=1))).max() < 0.002
+
+
+def test_without_weights_and_conflict_the_data_are_returned() -> None:
+    samples = noisy_samples("leaf", 0.05, noise=0.0)
+    found = RegressionSolver(samples.layout).solve(samples.frames, Weights(0.0, 0.0))
+    inner = np.setdiff1d(np.arange(samples.layout.size), samples.layout.marks)
+    np.testing.assert_array_equal(found.frames[inner], samples.frames[inner])
+
+
+def test_a_warm_start_ends_where_a_cold_one_does() -> None:
+    samples = noisy_samples("leaf", 0.03)
+    solver = RegressionSolver(samples.layout)
+    solver.solve(samples.frames, Weights(0.0, 0.3))
+    warm = solver.solve(samples.frames, WEIGHTS)
+    cold = RegressionSolver(samples.layout).solve(samples.frames, WEIGHTS)
+    np.testing.assert_allclose(warm.frames, cold.frames, atol=1e-9)
+
+
+def test_a_bad_start_ends_where_a_good_one_does() -> None:
+    samples = noisy_samples("leaf", 0.03, noise=0.05)
+    good = RegressionSolver(samples.layout).solve(samples.frames, WEIGHTS)
+    bad = samples.frames @ exp(0.25 * np.random.default_rng(4).standard_normal((samples.layout.size, 3)))
+    again = RegressionSolver(samples.layout).solve(samples.frames, WEIGHTS, bad)
+    assert again.energy == pytest.approx(good.energy, rel=1e-9)
+    np.testing.assert_allclose(again.frames, good.frames, atol=1e-7)
+
+
+def test_the_result_does_not_depend_on_the_step() -> None:
+    """Smoothing lengths are metres: the same smoothing on rows half as far apart."""
+    found = []
+    for step in (0.02, 0.01):
+        curves = [place_curve(c) for c in clean_curves(exact_scan(SHAPES["leaf"](), 0.0025).curves)]
+        samples = resample(curves, uniform_layout(curves, step), step)
+        frames = RegressionSolver(samples.layout).solve(samples.frames, Weights(0.1, 0.1)).frames
+        found.append((samples, frames))
+    coarse = found[0][0].layout
+    first = slice(*coarse.first[:2])
+    fine = found[1][0].layout.arc[: found[1][0].layout.first[1]]
+    nearest = abs(fine[None] - coarse.arc[first, None]).argmin(axis=1)
+    close = abs(fine[nearest] - coarse.arc[first]) < 1e-6
+    turned = log(np.swapaxes(found[0][1][first][close], 1, 2) @ found[1][1][nearest][close])
+    smoothed = log(np.swapaxes(found[0][0].frames[first][close], 1, 2) @ found[0][1][first][close])
+    assert close.sum() >= 8
+    assert np.linalg.norm(turned, axis=1).max() < 0.02 * np.linalg.norm(smoothed, axis=1).max()
