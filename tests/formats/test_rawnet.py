@@ -101,6 +101,7 @@ FAULTS = {
     text("1\n1\n1\n2\n1 3\n0 1\n3\n"): ("line 6", "closed", "wanted node 0 last, got 1"),
     text("1\n1\n1\n0\n1\n", 1): ("line 5", "number of samples", "at least 2"),
     text(HEAD, 2): ("line 9", "curve 1", "wanted 3 samples", "after 2"),
+    HEAD: ("line 7", "curve 1", "wanted 3 samples", "after 0"),
     text(HEAD, 4): ("line 11", "after the 1 curves", "0.3 1 0"),
     text(HEAD, 2) + "0.3 1 0 0": ("line 10", "sample 3 of 3", "got 4"),
     text(HEAD, 2) + "0.3 1 o 0 0 0 1": ("line 10", "curve 1", "sample 3 of 3", "'o'"),

@@ -11,6 +11,7 @@ from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _COLUMNS = 7
+_ROW = " ".join(["%+.8f"] * _COLUMNS)
 _UNIT_TOLERANCE = 0.05  # files carry as few as four decimals
 
 
@@ -94,13 +95,8 @@ class _Lines:
     def table(self, rows: int) -> Floats:
         """The next `rows` lines as numbers, (rows, 7)."""
         block = self._lines[self._next : self._next + rows]
-        cells = [line.split() for _, line in block]
-        try:
-            values = np.array(cells, dtype=np.float64)
-            fine = values.shape == (rows, _COLUMNS) and bool(np.isfinite(values).all())
-        except ValueError:
-            fine = False
-        if not fine:
+        values = _numbers([line for _, line in block])
+        if values.shape != (rows, _COLUMNS) or not np.isfinite(values).all():
             raise self._table_error(block, rows)
         self._next += rows
         return values
@@ -177,7 +173,15 @@ def _header(curve: CurveScan) -> Iterator[str]:
 
 def _rows(curve: CurveScan) -> Iterator[str]:
     table = np.column_stack([curve.distance, curve.tangent, curve.normal])
-    return (" ".join(f"{value:+.8f}" for value in row) for row in table.tolist())
+    return (_ROW % tuple(row) for row in table.tolist())
+
+
+def _numbers(lines: list[str]) -> Floats:
+    """Lines of numbers as a table; empty when they are none."""
+    try:
+        return np.loadtxt(lines, ndmin=2) if lines else np.empty((0, 0))
+    except ValueError:
+        return np.empty((0, 0))
 
 
 def _is_finite_number(word: str) -> bool:

@@ -21,6 +21,7 @@ _KNOWN = 0.001
 _LARGEST_STEP = 0.02
 _SETTLED = 1e-5
 _ROUNDS = 30
+_DAMPING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -63,10 +64,11 @@ def settle(curves: Sequence[FloatingCurve], poses: dict[int, Pose], contacts: Se
     )
     for _ in range(_ROUNDS):
         residual, jacobian = system.linearised(unknowns)
-        step = np.linalg.lstsq(jacobian, -residual, rcond=None)[0]
+        hessian = jacobian.T @ jacobian
+        step = np.linalg.solve(hessian + _DAMPING * np.diag(np.diag(hessian)), -jacobian.T @ residual)
         step *= min(1.0, _LARGEST_STEP / max(float(np.abs(step).max()), 1e-300))
-        unknowns = system.clipped(unknowns + step)
-        if np.abs(step).max() < _SETTLED:
+        before, unknowns = unknowns, system.clipped(unknowns + step)
+        if np.abs(unknowns - before).max() < _SETTLED:
             break
     residual = system.linearised(unknowns)[0][: 6 * len(contacts)]
     turns, places = unknowns[: 4 * len(placed)].reshape(-1, 4), unknowns[4 * len(placed) :].reshape(-1, 2)
