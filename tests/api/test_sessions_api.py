@@ -1,6 +1,8 @@
 """Sessions, curves and errors over HTTP."""
 
+import re
 from typing import Any
+from urllib.parse import urljoin, urlsplit
 
 import pytest
 
@@ -113,3 +115,12 @@ def test_the_api_describes_itself(server: Any) -> None:
         for operation in operations.values():
             assert operation["summary"], path
             assert operation["description"], path
+
+
+def test_its_page_needs_no_other_host(server: Any) -> None:
+    page = server.http.get(f"http://127.0.0.1:{server.port}/docs").text
+    assets = re.findall(r'(?:src|href)="([^"]+)"', page)
+    assert len(assets) >= 2
+    for asset in assets:
+        assert urlsplit(asset).netloc in ("", f"127.0.0.1:{server.port}")
+        assert server.http.get(urljoin(f"http://127.0.0.1:{server.port}/docs", asset)).status_code == 200

@@ -42,6 +42,9 @@ def create_app(settings: Settings) -> FastAPI:
         version=version("tracemesh"),
         description="Curve networks and surfaces from orientations measured along curves.",
         lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        swagger_ui_oauth2_redirect_url=None,
         middleware=[Middleware(Access, settings=settings)],
     )
     install_handlers(app)

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, PlainTextResponse
 from starlette.staticfiles import StaticFiles
 
@@ -21,8 +22,21 @@ def healthz() -> PlainTextResponse:
     return PlainTextResponse("ok\n")
 
 
+@router.get("/docs")
+def docs(request: Request) -> HTMLResponse:
+    """The API, to read and to try; nothing is loaded from another host."""
+    return get_swagger_ui_html(
+        openapi_url="/openapi.json",
+        title=f"{request.app.title} API",
+        swagger_js_url="/swagger/swagger-ui-bundle.js",
+        swagger_css_url="/swagger/swagger-ui.css",
+        swagger_favicon_url="/swagger/favicon-32x32.png",
+    )
+
+
 def mount_web(app: FastAPI, folder: Path = WEB) -> None:
-    """Serve the web app, or say how it is built."""
+    """Serve the web app, or say how it is built; and what the page of the API needs."""
+    app.mount("/swagger", StaticFiles(packages=[("fastapi_swagger", "resources")]))
     if (folder / "index.html").is_file():
         app.mount("/", StaticFiles(directory=folder, html=True))
     else:
