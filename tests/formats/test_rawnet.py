@@ -105,6 +105,7 @@ FAULTS = {
     text(HEAD, 4): ("line 11", "after the 1 curves", "0.3 1 0"),
     text(HEAD, 2) + "0.3 1 0 0": ("line 10", "sample 3 of 3", "got 4"),
     text(HEAD, 2) + "0.3 1 o 0 0 0 1": ("line 10", "curve 1", "sample 3 of 3", "'o'"),
+    text(HEAD, 2) + "0.3 1 0_0 0 0 0 1": ("line 10", "finite number", "'0_0'"),
     text(HEAD, 2) + "0.3 1 nan 0 0 0 1": ("line 10", "finite", "'nan'"),
     text(HEAD, 2) + "0.3 1 1e999 0 0 0 1": ("line 10", "finite", "'1e999'"),
     text(HEAD, 2) + "0.3 1 0 0 0 0 0": ("line 10", "normal of length 1", "got one of length 0"),

@@ -10,6 +10,7 @@ from tracemesh.errors import InputError, ScanError
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _COLUMNS = 7
 _ROW = " ".join(["%+.8f"] * _COLUMNS)
 _UNIT_TOLERANCE = 0.05  # files carry as few as four decimals
@@ -185,10 +186,7 @@ def _numbers(lines: list[str]) -> Floats:
 
 
 def _is_finite_number(word: str) -> bool:
-    try:
-        return bool(np.isfinite(float(word)))
-    except ValueError:
-        return False
+    return bool(_NUMBER.fullmatch(word)) and bool(np.isfinite(float(word)))
 
 
 def _shown(text: str) -> str:
