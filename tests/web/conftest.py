@@ -1,10 +1,5 @@
 """The pages as a person meets them: a real server process, a real browser, a device on the real ingest socket."""
 
-import socket
-import subprocess
-import sys
-import time
-import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from websockets.sync.client import connect
 
-from tests.web.support import PATIENCE, Rider, Server
+from tests.web.support import PATIENCE, Rider, Server, free_port, running_server
 from tracemesh.formats.recordings import recording_from_simulation
 from tracemesh.geometry.shapes import leaf
 from tracemesh.geometry.simulation import plan_scan, simulate_scan
@@ -33,30 +28,9 @@ FLAGS = (
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server with an empty data folder, shared by the tests of a file."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = int(probe.getsockname()[1])
-    data = tmp_path_factory.mktemp("data")
-    command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", str(data)]
-    with (data / "server.log").open("w") as log, subprocess.Popen(command, stderr=log) as process:
-        try:
-            _await_health(f"http://127.0.0.1:{port}/healthz", process)
-            yield Server(f"127.0.0.1:{port}")
-        finally:
-            process.terminate()
-
-
-def _await_health(url: str, process: subprocess.Popen[bytes]) -> None:
-    give_up = time.monotonic() + PATIENCE
-    while time.monotonic() < give_up:
-        assert process.poll() is None, "the server stopped"
-        try:
-            urllib.request.urlopen(url, timeout=1).close()
-        except OSError:
-            time.sleep(0.05)
-        else:
-            return
-    raise AssertionError("the server did not answer")
+    with running_server(tmp_path_factory.mktemp("data"), free_port()) as server:
+        server.await_health()
+        yield server
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,15 @@
 
 import base64
 import json
+import socket
+import subprocess
+import sys
+import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from playwright.sync_api import Locator
@@ -24,6 +30,20 @@ class Server:
     """A `tracemesh serve` process."""
 
     address: str
+    process: subprocess.Popen[bytes]
+
+    def await_health(self) -> None:
+        """Wait until it answers."""
+        give_up = time.monotonic() + PATIENCE
+        while time.monotonic() < give_up:
+            assert self.process.poll() is None, "the server stopped"
+            try:
+                urllib.request.urlopen(f"http://{self.address}/healthz", timeout=1).close()
+            except OSError:
+                time.sleep(0.05)
+            else:
+                return
+        raise AssertionError("the server did not answer")
 
     def call(self, method: str, path: str, body: object = None) -> Any:
         """JSON of a REST answer."""
@@ -36,6 +56,24 @@ class Server:
     def page(self, fragment: str = "") -> str:
         """Address of a page."""
         return f"http://{self.address}/{fragment}"
+
+
+@contextmanager
+def running_server(data: Path, port: int) -> Iterator[Server]:
+    """A server process on this port and data folder, still starting; killed without warning at the end."""
+    command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", str(data)]
+    with (data / "server.log").open("a") as log, subprocess.Popen(command, stderr=log) as process:
+        try:
+            yield Server(f"127.0.0.1:{port}", process)
+        finally:
+            process.kill()
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 class Rider:

@@ -101,3 +101,8 @@ export class Network {
     return "grown";
   }
 }
+
+/** The numbers of several lists, each once, in rising order. */
+export function mergedNumbers(...lists: readonly Iterable<number>[]): number[] {
+  return [...new Set(lists.flatMap((list) => [...list]))].sort((a, b) => a - b);
+}

@@ -1,6 +1,6 @@
 import type { Api } from "../protocol/api";
 import type { Reconstruction } from "../wire.gen";
-import { Network } from "./network";
+import { mergedNumbers, Network } from "./network";
 
 /** What a reconstruction left, as far as the page needs it. */
 export interface Result {
@@ -35,11 +35,11 @@ export async function loadResult(api: Api, reconstruction: Reconstruction): Prom
     api.artifact<Report>(artifacts["report.json"] ?? ""),
     api.curves(reconstruction.session),
   ]);
-  const marked = new Set(curves.flatMap((curve) => curve.marks.map((mark) => mark.node)));
+  const marked = mergedNumbers(...curves.map((curve) => curve.marks.map((mark) => mark.node)));
   return {
     reconstruction,
     report,
-    network: networkFromFile(file, [...marked].sort((a, b) => a - b)),
+    network: networkFromFile(file, marked),
     positions: Float32Array.from(file.points.flat()),
     normals: Float32Array.from(file.normals.flat()),
     meshUrl: artifacts["mesh.glb"],

@@ -1,0 +1,222 @@
+import type { Api } from "../protocol/api";
+import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
+import { type Reading, startSensor, type StopSensor } from "../protocol/sensors";
+import { DurableSpool } from "../protocol/spool";
+import { Uplink } from "../protocol/uplink";
+import type { Hello } from "../wire.gen";
+import { mergedNumbers, Network } from "./network";
+import { Recorder } from "./recorder";
+import { inWords } from "./session.svelte";
+
+/** Top of the phone forward, screen away from the surface: turns (t, N, B) into the phone's y, z, x. */
+const MOUNTING: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
+const READINGS_INTERVAL = 500;
+const BUZZ = 40;
+
+interface Mark {
+  readonly node: number;
+  readonly sample: number;
+}
+
+/** A phone that is a scanning device: its sensors, its recording and the way to the server. */
+export class PhoneStore {
+  readonly network = new Network();
+  name = $state("");
+  /** Counts changes of the drawn network. */
+  revision = $state(0);
+  connection = $state<Connection>("connecting");
+  sensing = $state(false);
+  scanning = $state(false);
+  /** Number of the curve being scanned, or of the next one; from 1. */
+  curve = $state(1);
+  boundary = $state(true);
+  closed = $state(false);
+  /** The node that the next mark names; undefined: a new one. */
+  node = $state<number>();
+  nodes = $state.raw<readonly number[]>([]);
+  marks = $state.raw<readonly Mark[]>([]);
+  /** Readings per second, as measured. */
+  rate = $state(0);
+  samples = $state(0);
+  /** Messages that the server has not committed. */
+  waiting = $state(0);
+  problem = $state("");
+  readonly #spool: DurableSpool;
+  #recorder: Recorder | undefined;
+  #uplink: Uplink | undefined;
+  #live: LiveSocket | undefined;
+  #stopSensor: StopSensor = () => undefined;
+  #wakeLock: WakeLockSentinel | undefined;
+  #committed = 0;
+  #readings = 0;
+  #timer: ReturnType<typeof setInterval> | undefined;
+
+  constructor(
+    private readonly api: Api,
+    readonly session: string,
+    private readonly window: Window,
+  ) {
+    this.#spool = new DurableSpool(session);
+  }
+
+  /** Open the session: what an earlier visit left in the spool is sent at once. */
+  async open(): Promise<void> {
+    try {
+      this.name = (await this.api.session(this.session)).name;
+    } catch (error) {
+      this.problem = inWords(error);
+      return;
+    }
+    const recorder = await Recorder.resume(this.#spool, newName, () => this.#stored());
+    this.#recorder = recorder;
+    this.curve = recorder.state.nextCurve + 1;
+    const { location } = this.window;
+    this.#uplink = new Uplink(socketUrl("/api/v1/ingest", location), this.#hello(recorder), this.#spool, {
+      state: (state) => (this.connection = state),
+      committed: (seq) => this.#commit(seq),
+      refused: (words) => (this.problem = words),
+    });
+    this.#live = new LiveSocket(socketUrl(`/api/v1/sessions/${this.session}/live`, location), {
+      message: (message) => this.#draw(this.network.apply(message)),
+      state: () => undefined,
+    });
+    this.#timer = setInterval(() => this.#measure(), READINGS_INTERVAL);
+  }
+
+  close(): void {
+    clearInterval(this.#timer);
+    this.#stopSensor();
+    void this.#wakeLock?.release();
+    this.#uplink?.close();
+    this.#live?.close();
+  }
+
+  /** Ask for the sensors; from a tap. */
+  async allowSensors(): Promise<void> {
+    this.problem = "";
+    this.#stopSensor();
+    this.#stopSensor = await startSensor(this.window, {
+      reading: (reading) => this.#take(reading),
+      failed: (words) => {
+        this.sensing = false;
+        this.problem = words;
+      },
+    });
+    await this.stayAwake();
+  }
+
+  /** Keep the screen on while sensors are read: a dark screen stops them. */
+  async stayAwake(): Promise<void> {
+    const { navigator, document } = this.window;
+    if (!("wakeLock" in navigator) || document.visibilityState !== "visible") return;
+    this.#wakeLock = await navigator.wakeLock.request("screen").catch(() => undefined);
+  }
+
+  async start(): Promise<void> {
+    this.marks = [];
+    this.scanning = true;
+    await this.#recorder?.start(this.boundary);
+  }
+
+  async stop(): Promise<void> {
+    await this.#end(false);
+  }
+
+  async mark(): Promise<void> {
+    const recorder = this.#recorder;
+    if (!recorder || recorder.samples === 0) return;
+    const node = this.node ?? this.newNode;
+    const sample = await recorder.mark(node);
+    this.marks = [...this.marks, { node, sample }];
+    this.nodes = mergedNumbers(this.nodes, [node]);
+    this.node = undefined;
+    this.window.navigator.vibrate?.(BUZZ);
+  }
+
+  /** Take back the last mark of the open curve; without one, the curve itself. */
+  async undo(): Promise<void> {
+    const last = this.marks.at(-1);
+    if (!last) return this.#end(true);
+    this.marks = this.marks.slice(0, -1);
+    await this.#recorder?.mark(last.node, last.sample, true);
+  }
+
+  /** The recording is finished; false while something is still on its way. */
+  async finish(): Promise<boolean> {
+    if (this.scanning || this.waiting > 0) return false;
+    this.close();
+    await this.#spool.clear();
+    return true;
+  }
+
+  /** The number that a new node gets. */
+  get newNode(): number {
+    return Math.max(-1, ...this.nodes, ...this.network.nodes.keys()) + 1;
+  }
+
+  async #end(discard: boolean): Promise<void> {
+    this.scanning = false;
+    this.marks = [];
+    await this.#recorder?.end(this.closed, discard);
+    this.curve = (this.#recorder?.state.nextCurve ?? 0) + 1;
+    this.boundary = false;
+    this.closed = false;
+    this.samples = 0;
+  }
+
+  #take(reading: Reading): void {
+    this.#readings += 1;
+    this.sensing = true;
+    void this.#recorder?.add(reading);
+  }
+
+  #measure(): void {
+    this.rate = (1000 * this.#readings) / READINGS_INTERVAL;
+    this.#readings = 0;
+    this.samples = this.#recorder?.samples ?? 0;
+  }
+
+  #stored(): void {
+    this.#count();
+    void this.#uplink?.wake();
+  }
+
+  #commit(seq: number): void {
+    this.#committed = seq;
+    this.#count();
+  }
+
+  #count(): void {
+    this.waiting = Math.max(0, (this.#recorder?.state.nextSeq ?? 0) - this.#committed);
+  }
+
+  #draw(change: string): void {
+    if (change === "gap") this.#live?.restart();
+    this.nodes = mergedNumbers(this.nodes, this.network.nodes.keys());
+    this.revision += 1;
+  }
+
+  #hello(recorder: Recorder): Hello {
+    const { recording } = recorder.state;
+    const reference = { acceleration: [0, 0, 1], magnetic: [0.5, 0, -0.8660254037844386] } as const;
+    return {
+      type: "hello",
+      versions: [1],
+      recording,
+      session: this.session,
+      device: {
+        id: recording,
+        kind: "phone",
+        name: "phone",
+        wheel: null,
+        mounting: MOUNTING,
+        reference: { acceleration: [...reference.acceleration], magnetic: [...reference.magnetic] },
+      },
+    };
+  }
+}
+
+function newName(): string {
+  const bytes = crypto.getRandomValues(new Uint8Array(8));
+  return `phone-${[...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+}
