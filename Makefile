@@ -16,7 +16,7 @@ setup: .make/python $(PAGE)  ## install Python and npm packages, build the web p
 demo: setup  ## watch a virtual Morphorider scan, become a network, become a surface
 	$(BIN)/tracemesh demo
 
-test: setup .make/browser  ## every test, the browser's included
+test: setup .make/browser .make/postgresql  ## every test, the browser's included
 	cd web && npm test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
 
@@ -52,4 +52,8 @@ $(PAGE): .make/npm .make/python $(WEB_SOURCES)
 
 .make/browser:
 	tools/install-system-package chromium chromium
+	@mkdir -p .make && touch $@
+
+.make/postgresql:
+	tools/install-system-package postgresql initdb '/usr/lib/postgresql/*/bin/initdb'
 	@mkdir -p .make && touch $@

@@ -28,8 +28,7 @@ def postgresql() -> Iterator[str]:
     """URL, less the database's name, of a real PostgreSQL that lives as long as the tests."""
     programs = [Path(found).parent for found in [shutil.which("initdb")] if found]
     programs += sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
-    if not programs:
-        pytest.skip("PostgreSQL is not installed (Debian: apt-get install postgresql)")
+    assert programs, "wanted PostgreSQL (Debian: apt-get install postgresql), found no initdb"
     folder = Path(tempfile.mkdtemp(prefix="tracemesh-postgresql-"))
     user = "nobody" if os.geteuid() == 0 else None  # PostgreSQL refuses to run as root
     if user:
