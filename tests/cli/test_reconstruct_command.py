@@ -53,7 +53,7 @@ def test_the_report_says_what_was_used(lilium: Path) -> None:
     report = json.loads((lilium / "report.json").read_text())
     assert report["generator"].startswith("tracemesh ")
     assert report["seconds"] > 0
-    assert report["network"]["parameters"]["step"] > 0
+    assert report["network"]["parameters"]["step_m"] > 0
     assert report["surface"]["euler_number"] == 1
 
 
