@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tracemesh.errors import InputError, ScanError
+from tracemesh.errors import InputError, ScanError, TracemeshError
 from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import (
     Recording,
@@ -182,3 +184,20 @@ def test_damaged_files_name_the_line(name: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         read_recording(lines, "scan.ndjson")
     assert "scan.ndjson" in str(caught.value)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_a_damaged_recording_gives_a_scan_or_an_error_for_people(data: st.DataObject) -> None:
+    lines = write_recording(recording(*curve(quaternions(4), quaternions(3, 4), mark(0, 7), mark(6, 8)))).splitlines()
+    row = data.draw(st.integers(0, len(lines) - 1))
+    at = data.draw(st.integers(0, len(lines[row])))
+    junk = data.draw(st.text(alphabet='0123456789-.,:[]{}"ean', max_size=2))
+    lines[row] = lines[row][:at] + junk + lines[row][at + data.draw(st.integers(0, 3)) :]
+    if data.draw(st.booleans()):
+        del lines[data.draw(st.integers(0, len(lines) - 1))]
+    try:
+        scan = scan_from_recordings([read_recording(lines, "damaged")])
+    except TracemeshError:
+        return
+    assert all(np.isfinite(c.tangent).all() and np.isfinite(c.distance).all() for c in scan.curves)
