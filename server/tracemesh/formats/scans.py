@@ -8,7 +8,7 @@ from tracemesh.geometry.scan import Scan
 def read_scan(text: str, source: str = "") -> Scan:
     """Scan in a rawnet or in a recording; raises InputError with `source` and line."""
     if is_recording(text):
-        return scan_from_recordings([read_recording(text.splitlines(), source)])
+        return scan_from_recordings([read_recording(text.split("\n"), source)])
     return read_rawnet(text, source)
 
 
