@@ -94,7 +94,7 @@ class Bridge:
         else:
             self._spool.close()
             waiting = self._spool.next_seq - self._uplink.acknowledged
-            self._console.say(f"{waiting} messages wait in {self._spool.folder}; the next start goes on there")
+            self._console.say(f"{waiting} messages wait in {self._spool.place}; the next start goes on there")
         if self._recorder.lost:
             self._console.say(f"{self._recorder.lost} samples were lost: there was no room for them")
         if self._failure:

@@ -48,7 +48,7 @@ async def _record(server: str, spool: Spool, left_over: list[Spool], make_source
 
     host = Host(Link("device", console.say))
     bridge = Bridge(make_source(host), spool, uplink(spool, "server"), host, console)
-    uploads = [asyncio.ensure_future(upload(s, uplink(s, f"left-over {s.folder.name}"))) for s in left_over]
+    uploads = [asyncio.ensure_future(upload(s, uplink(s, f"left-over {s.place.name}"))) for s in left_over]
     try:
         return await bridge.run()
     finally:

@@ -35,7 +35,7 @@ class Spool:
 
     def __init__(self, folder: Path, hello: Hello, segment_bytes: int = SEGMENT_BYTES) -> None:
         """Open the recording in `folder`, or begin it. Raises SpoolError if a file holds what no spool wrote."""
-        self.folder = folder
+        self.place = folder
         self.hello = hello
         self.trouble = ""
         self._segment_bytes = segment_bytes
@@ -74,7 +74,7 @@ class Spool:
 
     def staged(self) -> Iterator[Samples]:
         """What was staged before the bridge was killed, oldest first; a torn last line is left out."""
-        for line in (self.folder / _STAGED).read_bytes().splitlines(keepends=True):
+        for line in (self.place / _STAGED).read_bytes().splitlines(keepends=True):
             message = _message(line)
             if isinstance(message, Samples):
                 yield message
@@ -120,14 +120,14 @@ class Spool:
     def delete(self) -> None:
         """Remove the recording: the server has it all."""
         self.close()
-        shutil.rmtree(self.folder)
+        shutil.rmtree(self.place)
 
     def _path(self, first: int) -> Path:
-        return self.folder / f"{first:012d}.ndjson"
+        return self.place / f"{first:012d}.ndjson"
 
     def _segments_from(self, seq: int) -> Callable[[int], Path]:
         if seq < self.first_seq:
-            raise SpoolError(f"message {seq} was deleted; the oldest kept in {self.folder} is {self.first_seq}")
+            raise SpoolError(f"message {seq} was deleted; the oldest kept in {self.place} is {self.first_seq}")
         return lambda wanted: self._path(max(f for f in self._firsts if f <= wanted))
 
     def _open_last(self) -> int:
@@ -166,7 +166,7 @@ class Spool:
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o600)
         try:
             _write_all(file, _line(self.hello))
-            _sync_folder(self.folder)
+            _sync_folder(self.place)
         except OSError:
             os.close(file)
             path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Sends a spooled recording to a server, and goes on where the server stopped.
+"""Sends a recording to a server, and goes on where the server stopped.
 
 Every connection starts with `hello`; the server's `welcome` says which message it wants next. What it acknowledges is
 deleted from the spool, nothing else ever is. A connection that breaks, stalls or is refused is opened again, later each
@@ -8,7 +8,8 @@ time. At most `WINDOW` messages are under way, so memory stays bounded however s
 import asyncio
 import random
 from collections.abc import Coroutine
-from typing import Any, NoReturn
+from pathlib import Path
+from typing import Any, NoReturn, Protocol
 from urllib.parse import urlsplit, urlunsplit
 
 from pydantic import ValidationError
@@ -16,10 +17,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidStatus
 
 from tracemesh.wire.base import PROTOCOL_VERSION
-from tracemesh.wire.device import Ack, ErrorMessage, Welcome, to_device
+from tracemesh.wire.device import Ack, ErrorMessage, Hello, Welcome, to_device
 from tracemesh_bridge.errors import BridgeError, Refused
 from tracemesh_bridge.source import Link, LinkState
-from tracemesh_bridge.spool import Spool
 
 WINDOW = 256
 OPEN_TIMEOUT = 10.0
@@ -30,18 +30,57 @@ _FINAL = ("version", "malformed", "forbidden")
 """Errors that the same recording will meet again: tried again only after the longest delay."""
 
 
-class Uplink:
-    """Uploads one spool. Lives in one asyncio loop with whoever appends to the spool."""
+class Lines(Protocol):
+    """Reads a log from one message on."""
 
-    def __init__(self, server: str, token: str, spool: Spool, link: Link) -> None:
+    seq: int
+
+    def next(self) -> str | None:
+        """The next message's line, or None if it may not be sent yet."""
+        ...
+
+
+class Log(Protocol):
+    """What can be sent: a spool, or a recording in a file."""
+
+    hello: Hello
+
+    @property
+    def first_seq(self) -> int:
+        """Number of the oldest message still there."""
+        ...
+
+    @property
+    def next_seq(self) -> int:
+        """Number of the message that will come next."""
+        ...
+
+    @property
+    def place(self) -> Path:
+        """Where it is kept."""
+        ...
+
+    def lines(self, seq: int) -> Lines:
+        """Its messages from `seq` on."""
+        ...
+
+    def acknowledge(self, seq: int) -> None:
+        """The server has everything up to and including `seq`."""
+        ...
+
+
+class Uplink:
+    """Uploads one log. Lives in one asyncio loop with whoever appends to it."""
+
+    def __init__(self, server: str, token: str, log: Log, link: Link) -> None:
         """`server`: its address as a person types it, http, https, ws or wss; `token`: empty for none."""
         self._url = ingest_url(server)
         self._headers = {"Authorization": f"Bearer {token}"} if token else {}
-        self._spool = spool
+        self._log = log
         self._link = link
         self._changed = asyncio.Event()
         self._progress = asyncio.Event()
-        self.acknowledged = spool.first_seq
+        self.acknowledged = log.first_seq
         """Number of messages that the server has."""
         self.session = ""
 
@@ -67,8 +106,8 @@ class Uplink:
             delay = min(2 * delay, LONGEST_DELAY)
 
     async def finished(self) -> None:
-        """Wait until the server has everything that the spool holds."""
-        while self.acknowledged < self._spool.next_seq:
+        """Wait until the server has everything that the log holds."""
+        while self.acknowledged < self._log.next_seq:
             self._progress.clear()
             await self._progress.wait()
 
@@ -94,7 +133,7 @@ class Uplink:
                 raise
 
     async def _greet(self, socket: ClientConnection) -> None:
-        await socket.send(self._spool.hello.model_dump_json(exclude_none=True))
+        await socket.send(self._log.hello.model_dump_json(exclude_none=True))
         welcome = _answer(await socket.recv())
         if isinstance(welcome, ErrorMessage):
             _raise(welcome)
@@ -108,18 +147,18 @@ class Uplink:
         self._resume(welcome.next_seq)
 
     def _resume(self, next_seq: int) -> None:
-        if next_seq < self._spool.first_seq:
+        if next_seq < self._log.first_seq:
             raise Refused(
                 f"the server wants message {next_seq} again, which it had acknowledged; "
-                f"the spool {self._spool.folder} begins at {self._spool.first_seq}"
+                f"{self._log.place} begins at {self._log.first_seq}"
             )
-        if next_seq > self._spool.next_seq:
+        if next_seq > self._log.next_seq:
             raise Refused(
-                f"the server has {next_seq} messages of recording {self._spool.hello.recording}, the spool "
-                f"{self._spool.folder} only {self._spool.next_seq}: it is an old copy; start with another --spool"
+                f"the server has {next_seq} messages of recording {self._log.hello.recording}, "
+                f"{self._log.place} only {self._log.next_seq}: it is an old copy; start with another --spool"
             )
         self._acknowledge(next_seq - 1)
-        self._cursor = self._spool.lines(next_seq)
+        self._cursor = self._log.lines(next_seq)
 
     async def _send(self, socket: ClientConnection) -> NoReturn:
         while True:
@@ -159,7 +198,7 @@ class Uplink:
 
     def _acknowledge(self, seq: int) -> None:
         self.acknowledged = max(self.acknowledged, seq + 1)
-        self._spool.acknowledge(seq)
+        self._log.acknowledge(seq)
         self._changed.set()
         self._progress.set()
 

@@ -214,15 +214,16 @@ class Bench:
 
     def virtual(self, *options: str) -> Process:
         link, log = str(self.folder / "rider"), str(self.folder / "log")
-        device = self._start("virtual", "--link", link, "--log", log, "--pace", "request", *options)
+        device = self.start("virtual", "--link", link, "--log", log, "--pace", "request", *options)
         device.says("virtual Morphorider")
         return device
 
     def bridge(self, *options: str) -> Process:
-        port, spool = str(self.folder / "rider*"), str(self.folder / "spool")
-        return self._start(
-            "morphorider", "--port", port, "--spool", spool, "--server", self.server.address, *PATIENT, *options
-        )
+        return self.recording("morphorider", "--port", str(self.folder / "rider*"), *PATIENT, *options)
+
+    def recording(self, command: str, *options: str) -> Process:
+        spool = str(self.folder / "spool")
+        return self.start(command, "--spool", spool, "--server", self.server.address, *options)
 
     def sent(self) -> list[str]:
         """All whole frames that the device has sent, in hex."""
@@ -238,7 +239,7 @@ class Bench:
         for process in self._processes:
             process.stop(9)
 
-    def _start(self, *arguments: str) -> Process:
+    def start(self, *arguments: str) -> Process:
         self._processes.append(Process(*arguments))
         return self._processes[-1]
 

@@ -1,25 +1,14 @@
-"""The ride of a virtual Morphorider: where it is, what it answers, which keys its operator presses.
+"""The ride of a virtual Morphorider: where it is, and what it answers."""
 
-Apart from the port because the simulation brings half of scipy with it, which no other command needs.
-"""
-
-import os
 import random
-import sys
 import time
-from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from tracemesh.geometry import shapes
-from tracemesh.geometry.simulation import COUNTS, Handling, Imperfections, ScanPlan, plan_scan
-from tracemesh_bridge.errors import BridgeError
+from tracemesh.geometry.simulation import COUNTS
 from tracemesh_bridge.framing import Frame, FrameLayout, encode
-from tracemesh_bridge.sources.virtual import LATE_BY, VirtualSettings, say
-
-SHAPES: dict[str, Callable[[], shapes.Shape]] = {
-    f.__name__: f for f in (shapes.leaf, shapes.sphere, shapes.torus, shapes.cone, shapes.egg)
-}
+from tracemesh_bridge.sources.operator import Operator, ride_plan
+from tracemesh_bridge.sources.virtual import LATE_BY, VirtualSettings
 
 
 class Ride:
@@ -27,12 +16,12 @@ class Ride:
 
     def __init__(self, settings: VirtualSettings) -> None:
         """The ride begins with the first request. Raises BridgeError if there is no such shape."""
-        self._plan = plan = _plan(settings)
+        self._plan = ride_plan(settings.shape, settings.noise, settings.seed)
         self._settings = settings
         self._generator = np.random.default_rng(settings.seed)
         self._chance = random.Random(settings.seed)
         self._layout = FrameLayout()
-        self._keys = list(operator_keys(plan))
+        self._operator = Operator(self._plan)
         self._began: float | None = None
         self.requests = 0
 
@@ -51,23 +40,18 @@ class Ride:
     @property
     def over(self) -> bool:
         """Every key was pressed."""
-        return not self._keys
+        return self._operator.over
 
     @property
     def patience(self) -> float:
         """s until the next key is due, or a while if only requests move the ride on."""
         if self._settings.pace == "request" or self._began is None:
             return 1.0
-        return max(0.0, (self._keys[0][0] - self.time) / self._settings.speed)
+        return max(0.0, (self._operator.next_time - self.time) / self._settings.speed)
 
     def press_keys(self) -> None:
         """Print the keys that are due."""
-        while self._keys and self._keys[0][0] <= self.time:
-            _, keys = self._keys.pop(0)
-            try:
-                os.write(sys.stdout.fileno(), f"{keys}\n".encode())
-            except BrokenPipeError:
-                say("nobody reads the operator's keys any more")
+        self._operator.type_until(self.time)
 
     def answer(self) -> bytes:
         """What the device says to one request: a frame, or a fault."""
@@ -102,28 +86,6 @@ class Ride:
                 return name
             dice -= probability
         return ""
-
-
-def operator_keys(plan: ScanPlan) -> Iterator[tuple[float, str]]:
-    """What the operator types, and when (s since the ride began)."""
-    curves = iter(plan.curves)
-    for press in plan.keys:
-        match press.key:
-            case "boundary":
-                yield press.time, "-"
-            case "interior":
-                yield press.time, "+"
-            case "node":
-                yield press.time, str(press.node)
-            case "end":
-                yield press.time, "*" if next(curves).closed else "."
-    yield plan.duration + 0.5, "q"
-
-
-def _plan(settings: VirtualSettings) -> ScanPlan:
-    if settings.shape not in SHAPES:
-        raise BridgeError(f"wanted one of the shapes {', '.join(sorted(SHAPES))}, got {settings.shape!r}")
-    return plan_scan(SHAPES[settings.shape](), Handling(), Imperfections().scaled(settings.noise), settings.seed)
 
 
 def _vector(counts: np.ndarray[tuple[int], np.dtype[np.int64]]) -> tuple[float, float, float]:
