@@ -131,9 +131,9 @@ class ServerProcess:
     process: subprocess.Popen[bytes] | None = None
     client: RunningServer | None = None
 
-    def start(self) -> RunningServer:
+    def start(self, **options: Any) -> RunningServer:
         command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(self.port), "--data-dir", self.data_dir]
-        self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL, **options)
         self._hang_up()
         client = self.client = RunningServer(self.port)
         while True:
