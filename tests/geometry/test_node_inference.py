@@ -117,11 +117,32 @@ def test_marked_nodes_keep_their_numbers_and_hold_curves_together() -> None:
     assert found.unplaced == ()
     assert len(list(matches(scan, found, 0.025))) == len(true_pairs(scan))
     numbered = {p.node for p in found.proposals if p.node is not None}
-    assert numbered == set(scan.curves[1].node_ids.tolist()) & set(scan.curves[0].node_ids.tolist())
+    assert numbered == {*scan.curves[0].node_ids.tolist(), *scan.curves[1].node_ids.tolist()}
     again = mark_nodes(partly, found.proposals)
-    for node in numbered:
-        assert node in again.curves[0].node_ids
-        assert node in again.curves[1].node_ids
+    assert again.curves[0].node_ids.tolist() == boundary.node_ids.tolist()
+    assert {0, 6} <= set(again.curves[1].node_ids.tolist())
+
+
+def test_nothing_that_was_marked_is_lost_or_merged(shared_data: Path) -> None:
+    """Three nodes of this scan lie within 5 mm; found ones would be one, marked ones stay three."""
+    scan = noisy_scan(shared_data, "lilium7")
+    again = mark_nodes(scan, infer_nodes(scan).proposals)
+    for one, two in zip(scan.curves, again.curves, strict=True):
+        assert two.node_ids.tolist() == one.node_ids.tolist()
+        assert np.abs(one.distance[one.node_samples] - two.distance[two.node_samples]).max() < 0.004
+
+
+def test_a_mark_on_one_curve_only_gives_the_node_its_number_and_place() -> None:
+    scan = unmarked(simulated_scan("leaf", seed=7))
+    true = simulated_scan("leaf", seed=7).curves[4]
+    inside, sample = int(true.node_ids[1]), int(true.node_samples[1])
+    lonely = replace(scan.curves[4], node_samples=np.array([sample]), node_ids=np.array([inside]))
+    found = infer_nodes(Scan((*scan.curves[:4], lonely)))
+    (numbered,) = [p for p in found.proposals if p.node is not None]
+    assert numbered.node == inside
+    place = dict(numbered.places)[4]
+    assert abs(true.distance[place] - true.distance[sample]) < 0.002
+    assert len(numbered.places) == 2
 
 
 def test_without_anything_to_begin_with_it_says_so() -> None:

@@ -23,6 +23,8 @@ _SURE = 0.95
 _LIKELY = 0.3
 _APART = 0.03
 """m along both curves; nearer crossings of the same two curves are one."""
+_MARKED = 0.02
+"""m along a curve from a contact to a mark of it."""
 _SAME = 0.005
 """m along a curve; contacts nearer than this cannot be told apart: one node."""
 _ROUNDS = 2
@@ -61,7 +63,9 @@ def infer_nodes(scan: Scan) -> InferredNodes:
         search.settle_and_cross()
     search.settle_and_cross()
     unplaced = tuple(i for i in range(len(curves)) if i not in search.poses)
-    return InferredNodes(_proposals(scan, curves, search.contacts), unplaced)
+    lonely = [NodeProposal(((m.curve, m.sample),), 1.0, m.node) for m in search.lonely]
+    found = [*_proposals(scan, curves, search.contacts), *lonely]
+    return InferredNodes(tuple(sorted(found, key=lambda p: p.places)), unplaced)
 
 
 def mark_nodes(scan: Scan, proposals: Sequence[NodeProposal]) -> Scan:
@@ -77,12 +81,25 @@ def mark_nodes(scan: Scan, proposals: Sequence[NodeProposal]) -> Scan:
     return Scan(tuple(_marked(curve, sorted(m)) for curve, m in zip(scan.curves, marks, strict=True)))
 
 
+@dataclass(frozen=True)
+class _Mark:
+    """A marked node: sample and arc length, m, on a curve."""
+
+    curve: int
+    sample: int
+    arc: float
+    node: int
+
+
 class _Search:
     """What is placed so far."""
 
     def __init__(self, scan: Scan, curves: Sequence[FloatingCurve]) -> None:
         self._curves = curves
-        self._marked = _marked_contacts(scan, curves)
+        marks = _marks(scan, curves)
+        self._marked = _marked_contacts(marks)
+        paired = {c.node for c in self._marked}
+        self.lonely = [m for m in marks if m.node not in paired]
         self.contacts: list[Contact] = []
         start = _start(scan, curves)
         self.poses: dict[int, Pose] = {start: Pose(0.0, np.zeros(3))}
@@ -118,7 +135,7 @@ class _Search:
             self._trust[i] = attachment.confidence * self._trust[ends].min()
             for end, row in ((0.0, attachment.first), (self._curves[i].length, attachment.last)):
                 on, at = int(places.curve[row]), float(places.arc[row])
-                self.contacts.append(Contact(i, end, on, at, float(self._trust[i]), known_s=True))
+                self._add(Contact(i, end, on, at, float(self._trust[i]), known_s=True))
         self._follow_marks()
         return bool(chosen)
 
@@ -152,7 +169,22 @@ class _Search:
                     confidence = odds / (1 + odds) * min(self._trust[a], self._trust[b])
                     contact = Contact(a, found.s, b, found.t, float(confidence))
                     if odds > 1 and not any(self._is_same(contact, c) for c in self.contacts):
-                        self.contacts.append(contact)
+                        self._add(contact)
+
+    def _add(self, contact: Contact) -> None:
+        """Take in a contact; a mark next to it that no other curve shares says where it is, and its number."""
+        for mark in list(self.lonely):
+            near_s = contact.a == mark.curve and self._is_at(mark, contact.s)
+            near_t = contact.b == mark.curve and self._is_at(mark, contact.t)
+            if (near_s or near_t) and contact.node in (None, mark.node):
+                self.lonely.remove(mark)
+                contact = replace(contact, node=mark.node)
+                contact = replace(contact, s=mark.arc, known_s=True) if near_s else contact
+                contact = replace(contact, t=mark.arc, known_t=True) if near_t else contact
+        self.contacts.append(contact)
+
+    def _is_at(self, mark: _Mark, arc: float) -> bool:
+        return bool(abs(self._curves[mark.curve].apart(arc, mark.arc)) < _MARKED)
 
     def _is_same(self, one: Contact, other: Contact) -> bool:
         if (one.a, one.b) == (other.b, other.a):
@@ -172,30 +204,35 @@ def _start(scan: Scan, curves: Sequence[FloatingCurve]) -> int:
     raise ScanError("nodes can only be found beginning with a closed curve or a marked node: the scan has neither")
 
 
-def _marked_contacts(scan: Scan, curves: Sequence[FloatingCurve]) -> list[Contact]:
-    """Nodes that are marked on several curves, each as contacts with the first of them."""
-    first: dict[int, tuple[int, float]] = {}
-    contacts = []
-    for index, (scanned, curve) in enumerate(zip(scan.curves, curves, strict=True)):
-        for sample, node in zip(scanned.node_samples, scanned.node_ids, strict=True):
-            arc = float(np.clip(scanned.distance[sample] - curve.start, 0.0, curve.length))
-            if int(node) not in first:
-                first[int(node)] = index, arc
-            else:
-                other, at = first[int(node)]
-                contacts.append(Contact(other, at, index, arc, 1.0, known_s=True, known_t=True, node=int(node)))
-    return contacts
+def _marks(scan: Scan, curves: Sequence[FloatingCurve]) -> list[_Mark]:
+    """All marks of a scan."""
+    return [
+        _Mark(i, int(sample), float(np.clip(scanned.distance[sample] - curve.start, 0.0, curve.length)), int(node))
+        for i, (scanned, curve) in enumerate(zip(scan.curves, curves, strict=True))
+        for sample, node in zip(scanned.node_samples, scanned.node_ids, strict=True)
+    ]
 
 
-def _proposals(scan: Scan, curves: Sequence[FloatingCurve], contacts: Sequence[Contact]) -> tuple[NodeProposal, ...]:
-    """Contacts that share a place on a curve are one node."""
+def _marked_contacts(marks: Sequence[_Mark]) -> list[Contact]:
+    """Nodes that are marked more than once, each as contacts with the first mark."""
+    first: dict[int, _Mark] = {}
+    return [
+        Contact(f.curve, f.arc, m.curve, m.arc, 1.0, known_s=True, known_t=True, node=m.node)
+        for m in marks
+        if (f := first.setdefault(m.node, m)) is not m
+    ]
+
+
+def _proposals(scan: Scan, curves: Sequence[FloatingCurve], contacts: Sequence[Contact]) -> list[NodeProposal]:
+    """Contacts that share a place on a curve are one node, unless they were marked as different ones."""
     groups: list[list[Contact]] = []
-    for contact in contacts:
+    for contact in sorted(contacts, key=lambda c: c.node is None):
         touching = [g for g in groups if any(_share_a_place(contact, c, curves) for c in g)]
-        merged = [contact, *(c for g in touching for c in g)]
-        groups = [g for g in groups if g not in touching] + [merged]
-    proposals = [_proposal(scan, curves, group) for group in groups]
-    return tuple(sorted(proposals, key=lambda p: p.places))
+        numbers = {c.node for g in touching for c in g if c.node is not None}
+        if len(numbers) > 1 or (contact.node is not None and numbers - {contact.node}):
+            touching = [g for g in touching if any(c.node == contact.node for c in g if c.node is not None)]
+        groups = [g for g in groups if g not in touching] + [[contact, *(c for g in touching for c in g)]]
+    return [_proposal(scan, curves, group) for group in groups]
 
 
 def _share_a_place(one: Contact, other: Contact, curves: Sequence[FloatingCurve]) -> bool:
@@ -221,6 +258,8 @@ def _proposal(scan: Scan, curves: Sequence[FloatingCurve], group: Sequence[Conta
 def _sample(scanned: CurveScan, curve: FloatingCurve, arcs: Sequence[float]) -> int:
     """The sample nearest to the middle of arc lengths, m, that belong together."""
     middle = arcs[0] + float(np.mean(curve.apart(np.array(arcs), arcs[0])))
+    if curve.closed and curve.length - middle < _SAME:  # where it ends is where it begins
+        middle = 0.0
     return int(np.abs(scanned.distance - curve.start - middle).argmin())
 
 
