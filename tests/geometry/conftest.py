@@ -56,10 +56,10 @@ def _scan_curve(
 
 @pytest.fixture(scope="session")
 def faulty_scan() -> Callable[..., FaultyScan]:
-    """Function (shape name, spacing in m, faults, seed) -> FaultyScan."""
+    """Function (shape name, spacing in m, seed, sizes of the faults) -> FaultyScan."""
 
-    def make(name: str, spacing: float = 0.0013, faults: Faults = Faults(), seed: int = 0) -> FaultyScan:
-        random = np.random.default_rng(seed)
+    def make(name: str, spacing: float = 0.0013, seed: int = 0, **sizes: float) -> FaultyScan:
+        faults, random = Faults(**sizes), np.random.default_rng(seed)
         curves = SHAPES[name]().curves
         heading = faults.heading * random.standard_normal(len(curves))
         scale = faults.scale * random.standard_normal(len(curves))
@@ -74,7 +74,7 @@ def faulty_scan() -> Callable[..., FaultyScan]:
 
 @pytest.fixture(scope="session")
 def true_points() -> Callable[[CurveNetwork, Sequence[ShapeCurve]], Floats]:
-    """Function (network, curves) -> exact positions (n, 3) of the network's points, at the same share of their segment."""
+    """Function (network, curves) -> exact positions (n, 3) of points at the same share of their segment."""
 
     def find(network: CurveNetwork, curves: Sequence[ShapeCurve]) -> Floats:
         points = np.full_like(network.points, np.nan)
@@ -90,7 +90,7 @@ def true_points() -> Callable[[CurveNetwork, Sequence[ShapeCurve]], Floats]:
 
 @pytest.fixture(scope="session")
 def misfit() -> Callable[[Floats, Floats], Floats]:
-    """Function (points, truth) -> distances (n,), m, of points (n, 3) from their own truth (n, 3), best rigidly placed."""
+    """Function (points, truth) -> distances (n,), m, of points from their own truth, best placed rigidly."""
 
     def measure(points: Floats, truth: Floats) -> Floats:
         x, y = points - points.mean(axis=0), truth - truth.mean(axis=0)

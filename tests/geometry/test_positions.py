@@ -10,7 +10,6 @@ from tracemesh.geometry.cleaning import clean_curves
 from tracemesh.geometry.placement import place_curve, uniform_layout
 from tracemesh.geometry.positions import check_connected, segment_vectors, solve_positions
 from tracemesh.geometry.quadrature import edge_vectors
-from tracemesh.geometry.resampling import resample
 from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.samples import Layout, NetworkSamples
 from tracemesh.geometry.scan import Scan

@@ -27,9 +27,8 @@ def noisy_samples(name: str, step: float, noise: float = 0.1, seed: int = 0) -> 
 
 def residuals(frames: np.ndarray, data: np.ndarray, stencil: Stencil, weights: Weights) -> np.ndarray:
     """The energy's terms one by one, as Eq. 3.27 states them, for an independent least-squares solver."""
-    x, parts = frames, []
-    for k in range(stencil.size):
-        parts.append(np.sqrt(stencil.data[k]) * (x[k] - data[k]))
+    x = frames
+    parts = [np.sqrt(stencil.data[k]) * (x[k] - data[k]) for k in range(stencil.size)]
     for left, right, h in zip(stencil.left, stencil.right, stencil.h, strict=True):
         parts.append(weights.stretch / np.sqrt(h) * (x[left] - x[right]))
     for k, (b, c, a) in enumerate(zip(stencil.before, stencil.centre, stencil.after, strict=True)):

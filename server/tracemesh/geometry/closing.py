@@ -16,6 +16,7 @@ from tracemesh.geometry.weights import Choice, noise_level
 
 Floats = NDArray[np.float64]
 
+_CLEARLY = 1.5  # more than chance makes of a few loops
 _FIRST_SHIFT = 0.05  # steps: a first guess at the deviation of node marks
 
 
@@ -33,14 +34,22 @@ class Closing:
     walk: Floats
     drift: float
 
+    def expected_gaps(self, layout: Layout) -> Floats:
+        """Root mean square (s,), m, of segments' gaps from the random errors alone that cross-validation found."""
+        length = layout.segment_lengths
+        walk = self.walk[layout.segment_curve] / self.variances.segments
+        result: Floats = np.sqrt(3 * (walk * length + (self.drift * length) ** 2))
+        return result
+
     def noise_factor(self, layout: Layout, gaps: Floats) -> float:
-        """Ratio, at least 1, of the noise that the gaps (s, 3), m, of final positions show to the one expected."""
+        """Ratio of the noise that gaps (s, 3), m, of final positions show to the expected one, if clearly above 1."""
         loops = len(gaps) - layout.node_count + 1
         if not loops:
             return 1.0
         length = layout.segment_lengths
         expected = self.walk[layout.segment_curve] * length + self.variances.segments * (self.drift * length) ** 2
-        return float(max(1.0, np.sqrt(np.sum(np.sum(gaps**2, axis=1) / expected) / (3 * loops))))
+        ratio = float(np.sqrt(np.sum(np.sum(gaps**2, axis=1) / expected) / (3 * loops)))
+        return ratio if ratio > _CLEARLY else 1.0
 
 
 def close_network(

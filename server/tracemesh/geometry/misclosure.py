@@ -27,11 +27,14 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
+_END_DEVIATION = 2.0  # of a spline at its end, over that inside: its kernel is one-sided there
+
+
 @dataclass(frozen=True)
 class NoiseLevel:
     """Expected errors that no curve has as a whole. walk: (c,) m, variance per metre travelled of a curve's positions,
-    per axis. normal: (c,) rad, standard deviation of a smoothed normal, per axis. drift: relative to a segment's
-    length, what no device does better.
+    per axis. normal: (c,) rad, standard deviation of a smoothed normal inside a curve, per axis. drift: relative to a
+    segment's length, what no device does better.
     """
 
     walk: Floats
@@ -145,7 +148,9 @@ class Misclosures:
         mean = np.zeros((layout.node_count, 3))
         np.add.at(mean, node, normal)
         mean = normalized(mean)
-        basis = tangent_bases(mean)[node] / noise.normal[curve][:, None, None]
+        at_end = np.isin(marks, layout.first[:-1]) | np.isin(marks, layout.first[1:] - 1)
+        level = 1 / (noise.normal[curve] * np.where(at_end, _END_DEVIATION, 1.0))
+        basis = level[:, None, None] * tangent_bases(mean)[node]
         row = 2 * np.arange(len(marks))[:, None] + np.arange(2)
         rotation, _ = self._columns(curve)
         shift = 4 * self.curves + np.arange(len(marks))
@@ -156,8 +161,8 @@ class Misclosures:
             [-basis @ hat(normal), bend],
             (row.size, self.size),
         )
-        level = np.repeat(1 / noise.normal[curve], 2)
-        free = _sparse([row], [2 * node[:, None] + np.arange(2)], [level.reshape(-1, 2)], (row.size, 2 * len(mean)))
+        both = np.repeat(level[:, None], 2, axis=1)
+        free = _sparse([row], [2 * node[:, None] + np.arange(2)], [both], (row.size, 2 * len(mean)))
         return Equations(np.einsum("mij,mj->mi", basis, mean[node] - normal).ravel(), -free, shared)
 
     def _normal_rates(self) -> Floats:

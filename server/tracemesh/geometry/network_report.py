@@ -10,8 +10,9 @@ from tracemesh.geometry.samples import Layout
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_BAD_FIT = 6.0  # times the median of gaps per root of length
+_BAD_FIT = 8.0  # times the expected gap
 _WORTH_A_WARNING = 0.02  # of a segment's length
+_MOST = 3  # warnings; one wrong node number spoils its neighbours too
 
 
 def bias_report(closing: Closing | None, indices: Ints) -> dict[str, object]:
@@ -34,13 +35,16 @@ def bias_report(closing: Closing | None, indices: Ints) -> dict[str, object]:
     }
 
 
-def fit_warnings(layout: Layout, gaps: Floats, indices: Ints) -> list[str]:
-    """Segments whose gaps (s, 3), m, stand out: most likely a node with a wrong number or a wrong mark."""
+def fit_warnings(layout: Layout, gaps: Floats, expected: Floats, indices: Ints) -> list[str]:
+    """The worst of the segments whose gaps (s, 3), m, random errors (s,), m, do not explain.
+
+    Most likely a node has a wrong number, or a mark was set far from it.
+    """
     gap = np.linalg.norm(gaps, axis=1)
-    rate = gap / np.sqrt(layout.segment_lengths)
-    bad = (rate > _BAD_FIT * np.median(rate)) & (gap > _WORTH_A_WARNING * layout.segment_lengths)
+    bad = np.flatnonzero((gap > _BAD_FIT * expected) & (gap > _WORTH_A_WARNING * layout.segment_lengths))
+    worst = bad[np.argsort(-gap[bad] / expected[bad])][:_MOST]
     return [
         f"{curve_name(indices[layout.segment_curve[s]])} misses its node by {gap[s]:.2g} m on a segment of "
         f"{layout.segment_lengths[s]:.2g} m: is a node number wrong?"
-        for s in np.flatnonzero(bad)
+        for s in worst
     ]

@@ -162,6 +162,11 @@ class NetworkReconstruction:
             return Positions(points_on_polyline(self._measured, layout), self._measured.positions.gaps)
         return solve_positions(layout, edge_vectors(layout, frames))
 
+    def _warnings(self, layout: Layout, positions: Positions) -> list[str]:
+        if self._closing is None:
+            return []
+        return fit_warnings(layout, positions.gaps, self._closing.expected_gaps(layout), self._indices)
+
     def _report(
         self,
         network: CurveNetwork,
@@ -196,7 +201,7 @@ class NetworkReconstruction:
             "uncertainty": {"mean_m": float(uncertainty.mean()), "max_m": float(uncertainty.max())},
             "regression": {"energy": regression.energy, "iterations": regression.iterations},
             "seconds": dict(self._stages.seconds),
-            "warnings": fit_warnings(layout, positions.gaps, self._indices),
+            "warnings": self._warnings(layout, positions),
         }
 
 

@@ -15,7 +15,7 @@ from scipy.linalg import solveh_banded
 from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.interpolation import interpolate
 from tracemesh.geometry.placement import PlacedCurve
-from tracemesh.geometry.rotations import exp, log, matrix_to_quaternion, quaternion_difference
+from tracemesh.geometry.rotations import darboux_frames, exp, log, matrix_to_quaternion, quaternion_difference
 from tracemesh.geometry.samples import NetworkSamples
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,8 @@ def measured_offsets(curves: Sequence[PlacedCurve], samples: NetworkSamples) -> 
         rows.append(first + inner)
     row, place = np.concatenate(rows), np.concatenate(places)
     edge = row - layout.curve[row]  # every curve before has one edge less than rows
-    between = interpolate(layout, samples.frames.reshape(-1, 9), edge, place).reshape(-1, 3, 3)
+    columns = interpolate(layout, samples.frames[:, :, :2].reshape(-1, 6), edge, place).reshape(-1, 3, 2)
+    between = darboux_frames(columns[:, :, 0], columns[:, :, 1])
     value = quaternion_difference(np.concatenate([c.quaternion for c in curves]), matrix_to_quaternion(between))
     fraction = (place - layout.arc[row]) / layout.lengths[edge]
     weight = np.concatenate([np.gradient(p) for p in places])

@@ -22,7 +22,7 @@ Ints = NDArray[np.int64]
 _FOLDS = 5
 _RUNS_PER_STEP = 4
 _BENDS = 2.0 ** np.arange(-2, 7)  # trials, in steps
-_LEAST_TILT, _LEAST_DRIFT = 1e-3, 1e-4  # rad and relative: what no device does better, were its data free of noise
+_LEAST_TILT, _LEAST_DRIFT = 2e-4, 1e-4  # rad and relative: what no device does better, were its data free of noise
 _SPLINE_GAIN = 0.265  # 3 sqrt(2) / 16: integral of the squared kernel of a smoothing spline of width 1
 _STRETCHES = (0.25, 0.5, 1.0)
 
