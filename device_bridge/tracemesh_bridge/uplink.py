@@ -99,7 +99,7 @@ class Uplink:
                 delay = LONGEST_DELAY
                 self._down(str(error))
             except (OSError, TimeoutError, InvalidHandshake, ConnectionClosed, BridgeError) as error:
-                self._down(_words(error))
+                self._down(failure(error))
             if self.acknowledged > before:
                 delay = FIRST_DELAY
             await asyncio.sleep(delay * random.uniform(0.5, 1.0))
@@ -237,7 +237,8 @@ def _raise(error: ErrorMessage) -> NoReturn:
     raise (Refused if error.code in _FINAL else BridgeError)(f"the server says {error.code}: {error.message}")
 
 
-def _words(error: BaseException) -> str:
+def failure(error: BaseException) -> str:
+    """Why a connection failed, for people."""
     match error:
         case InvalidStatus() if error.response.status_code in (401, 403):
             return "the server wants a token, or another one: set TRACEMESH_TOKEN"

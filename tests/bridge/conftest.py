@@ -68,6 +68,10 @@ class RecordingServer:
         assert connection.request is not None
         assert connection.request.path == "/api/v1/ingest"
         self.headers.append(connection.request.headers)
+        with contextlib.suppress(ConnectionClosed):  # bridges are killed here
+            await self._converse(connection)
+
+    async def _converse(self, connection: ServerConnection) -> None:
         hello = from_device.validate_json(await connection.recv())
         assert isinstance(hello, Hello)
         self.hellos.append(hello)
@@ -77,10 +81,9 @@ class RecordingServer:
         stored = self.stored.setdefault(hello.recording, [])
         welcome = Welcome(version=PROTOCOL_VERSION, session=hello.session or SESSION, next_seq=len(stored))
         await connection.send(welcome.model_dump_json())
-        with contextlib.suppress(ConnectionClosed):  # bridges are killed here
-            async for line in connection:
-                if not await self._take(connection, hello.recording, str(line)):
-                    return
+        async for line in connection:
+            if not await self._take(connection, hello.recording, str(line)):
+                return
 
     async def _take(self, connection: ServerConnection, recording: str, line: str) -> bool:
         message = from_device.validate_json(line)

@@ -13,13 +13,14 @@ from tracemesh_bridge.commands.options import (
     positive,
     target,
 )
+from tracemesh_bridge.doctor import examine
 from tracemesh_bridge.inspection import inspect
 from tracemesh_bridge.record import record
 from tracemesh_bridge.sources.morphorider import Morphorider, MorphoriderSettings
 
 
 def add(commands: Commands) -> None:
-    """Add `morphorider` and `inspect`."""
+    """Add `morphorider`, `inspect` and `doctor`."""
     command = add_recording_command(commands, "morphorider", "record a Morphorider on a serial port", _morphorider)
     add_port(command)
     option = command.add_argument
@@ -30,6 +31,10 @@ def add(commands: Commands) -> None:
     option = command.add_argument
     option("--count", type=int, default=20, help="frames to show (default %(default)d)")
     option("--interval", type=positive, default=0.5, help="s between two frames (default %(default)g)")
+    command = add_command(commands, "doctor", "tell what is wrong with a device, its port or the server", _doctor)
+    add_port(command)
+    command.add_argument("--server", help="also look whether this server takes recordings")
+    command.add_argument("--seconds", type=positive, default=5.0, help="to look at the device (default %(default)g)")
 
 
 def _morphorider(args: argparse.Namespace) -> int:
@@ -37,6 +42,15 @@ def _morphorider(args: argparse.Namespace) -> int:
     wheel = Wheel(circumference=args.circumference, ticks_per_turn=settings.layout.ticks_per_turn)
     rider = device(args, "morphorider", wheel)
     return not record(target(args), rider, lambda host: Morphorider(settings, rider, host))
+
+
+def _doctor(args: argparse.Namespace) -> int:
+    settings = MorphoriderSettings(args.port, timeout=args.timeout, layout=layout(args))
+    wrong = 0
+    for finding in examine(settings, args.seconds, args.server):
+        print(finding, flush=True)
+        wrong += bool(finding.advice)
+    return int(wrong > 0)
 
 
 def _inspect(args: argparse.Namespace) -> int:
