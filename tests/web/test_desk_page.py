@@ -127,6 +127,15 @@ def test_a_file_is_opened_edited_and_reconstructed_with_other_parameters(
     curves.get_by_role("button", name="Undo").click()
     expect(curves.get_by_role("button", name="interior")).to_have_count(4)
 
+    nodes = curves.get_by_role("list", name="Marked nodes").get_by_role("listitem")
+    expect(nodes).to_have_count(11)
+    curves.get_by_role("button", name="Edit node 8").click()
+    curves.get_by_label("is").fill("9")
+    curves.get_by_role("button", name="Set").click()
+    expect(nodes).to_have_count(10)
+    curves.get_by_role("button", name="Undo").click()
+    expect(nodes).to_have_count(11)
+
     page.get_by_role("button", name="Reconstruct").click()
     view = page.locator("canvas")
     expect(view).to_have_attribute("data-surface", "shown")

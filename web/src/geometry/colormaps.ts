@@ -1,11 +1,6 @@
-/** Perceptually uniform colour maps as a few sRGB stops, evenly spaced, interpolated between them. */
+/** Colour maps as a few sRGB stops, evenly spaced, interpolated between them. */
 
 export type Stops = readonly string[];
-
-/** For magnitudes: matplotlib's viridis (CC0). */
-export const viridis: Stops = [
-  "#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725",
-];
 
 /** For signed values, also with colour-blind eyes: ColorBrewer's blue to white to orange (PuOr turned to blue). */
 export const diverging: Stops = [

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { formatAngle, formatCount, formatLength, formatRound, formatSeconds, roundDown, significant } from "./units";
+import { counted, formatAngle, formatCount, formatLength, formatRound, formatSeconds, roundDown, significant } from "./units";
 
 it("lengths come in the unit that suits them", () => {
   expect([0.0004, 0.0123, 0.456, 1.234, 0].map(formatLength)).toEqual(["0.400 mm", "12.3 mm", "45.6 cm", "1.23 m", "0 mm"]);
@@ -10,6 +10,7 @@ it("times, angles and counts carry their unit", () => {
   expect([0.0123, 2.4, 180].map(formatSeconds)).toEqual(["12.3 ms", "2.40 s", "3 min"]);
   expect(formatAngle(Math.PI / 3)).toBe("60.0°");
   expect(formatCount(19800)).toBe("19\u202f800");
+  expect([0, 1, 2].map((count) => counted(count, "curve"))).toEqual(["0 curves", "1 curve", "2 curves"]);
 });
 
 it("numbers have three significant digits and no exponent", () => {

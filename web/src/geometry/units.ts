@@ -27,6 +27,11 @@ export function formatCount(count: number): string {
   return count.toLocaleString("en").replaceAll(",", "\u202f");
 }
 
+/** A count with its noun: 1 curve, 2 curves. */
+export function counted(count: number, noun: string): string {
+  return `${formatCount(count)} ${noun}${count === 1 ? "" : "s"}`;
+}
+
 /** Three significant digits, never in exponent form. */
 export function significant(value: number): string {
   if (value === 0) return "0";

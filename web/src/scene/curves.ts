@@ -87,6 +87,7 @@ export class CurvesLayer {
     }
     for (const [index, curve] of network.curves) {
       const shown = this.#shown.get(index) ?? this.#add(index, curve);
+      if (shown.curve !== curve) shown.positions = new Float32Array();
       shown.curve = curve;
       this.#style(shown);
     }
@@ -107,6 +108,7 @@ export class CurvesLayer {
 
   #extend(shown: Shown): void {
     const target = shown.curve.points.coordinates;
+    if (target.length === shown.positions.length) return;
     const first = Math.floor(Math.min(shown.positions.length, target.length) / 3);
     shown.positions = withTail(shown.positions, target, this.#progress < 1);
     shown.line.set(shown.positions, this.#progress < 1 ? 0 : first);

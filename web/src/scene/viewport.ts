@@ -144,7 +144,9 @@ export class Viewport {
     return this.#curves.tips();
   }
 
+  /** Length at the centre of attention that one CSS px shows, m; 0 while there is nothing to see. */
   get metresPerPixel(): number {
+    if (!this.#box) return 0;
     return this.rig.metresPerPixel(this.canvas.clientHeight);
   }
 

@@ -2,7 +2,15 @@ import { type Api, ApiProblem } from "../protocol/api";
 import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
 import type { ToBrowser } from "../protocol/messages";
 import { polylineLength } from "../geometry/vectors";
-import type { LiveDevice, Reconstruction, ReconstructionParameters, RecordingSummary, Session } from "../wire.gen";
+import type {
+  Curve,
+  LiveDevice,
+  Mark,
+  Reconstruction,
+  ReconstructionParameters,
+  RecordingSummary,
+  Session,
+} from "../wire.gen";
 import { History } from "./history.svelte";
 import { Network } from "./network";
 import { loadResult, type Result } from "./result";
@@ -120,6 +128,26 @@ export class SessionStore {
     };
     const label = `curve ${curve.index + 1} ${nowIs(flag, value)}`;
     await this.#command(() => this.history.do({ label, run: () => set(value), revert: () => set(!value) }));
+  }
+
+  /** Let all marks of a node name another one, which joins the two if both exist; undefined deletes them. */
+  async editNode(node: number, to: number | undefined): Promise<void> {
+    const edited = (marks: readonly Mark[]): Mark[] =>
+      to === undefined
+        ? marks.filter((mark) => mark.node !== node)
+        : marks.map((mark) => (mark.node === node ? { ...mark, node: to } : mark));
+    await this.#command(async () => {
+      const curves = (await this.api.curves(this.id)).filter((curve) => curve.marks.some((mark) => mark.node === node));
+      const set = async (marks: (curve: Curve) => Mark[]): Promise<void> => {
+        for (const curve of curves) await this.api.updateCurve(this.id, curve.index, { marks: marks(curve) });
+        this.#outdate();
+      };
+      await this.history.do({
+        label: `node ${node} ${to === undefined ? "deleted" : `is now ${to}`}`,
+        run: () => set((curve) => edited(curve.marks)),
+        revert: () => set((curve) => curve.marks),
+      });
+    });
   }
 
   async undo(): Promise<void> {
