@@ -16,8 +16,6 @@ from tracemesh.geometry.misclosure import Misclosures
 
 Floats = NDArray[np.float64]
 
-_LEAST = 1e-30  # variance of what is not modelled: it stays zero
-
 
 @dataclass(frozen=True)
 class Corrections:
@@ -41,18 +39,24 @@ class Adjustment:
         self._m = misclosures
         s, n = misclosures.segments, misclosures.normals
         by_s, by_n = 1 / np.sqrt(variances.segments), 1 / np.sqrt(variances.normals)
-        self._rows: csc_array = block_array(
-            [[-by_s * s.free, None, by_s * s.shared], [None, -by_n * n.free, by_n * n.shared]], format="csc"
-        )
+        parts = [[-by_s * s.free, None], [None, -by_n * n.free]]
+        self._free = s.free.shape[1] + n.free.shape[1]
+        if variances.with_bias:
+            parts = [[*parts[0], by_s * s.shared], [*parts[1], by_n * n.shared]]
+        self._rows: csc_array = block_array(parts, format="csc")
         self._right = np.concatenate([by_s * s.y, by_n * n.y])
-        free = s.free.shape[1] + n.free.shape[1]
-        c, m = misclosures.curves, misclosures.marks
-        inverse = np.linalg.inv(variances.rotation + _LEAST * np.eye(3))
-        rest = np.concatenate([np.full(c, 1 / (variances.scale + _LEAST)), np.full(m, 1 / (variances.shift + _LEAST))])
-        self._root = block_diag(
-            [coo_array((free, free)), *[np.linalg.cholesky(inverse)] * c, diags_array(np.sqrt(rest))], format="csc"
-        )
+        self._root = self._prior_root(variances)
         self._factors: SuperLU = splu((self._rows.T @ self._rows + self._root @ self._root.T).tocsc())
+
+    def _prior_root(self, variances: Variances) -> csc_array:
+        """Root R of the precision R R^T of what is known beforehand: nothing of the free unknowns."""
+        free = coo_array((self._free, self._free))
+        if not variances.with_bias:
+            return free.tocsc()
+        c, m = self._m.curves, self._m.marks
+        rotation = np.linalg.cholesky(np.linalg.inv(variances.rotation))
+        rest = np.concatenate([np.full(c, variances.scale**-0.5), np.full(m, variances.shift**-0.5)])
+        return csc_array(block_diag([free, *[rotation] * c, diags_array(rest)]))
 
     def solution(self) -> Corrections:
         """The most probable corrections."""
@@ -65,12 +69,12 @@ class Adjustment:
         return self._split(self._factors.solve(noise + prior).T)
 
     def _split(self, x: Floats) -> Corrections:
+        """Corrections from a vector of unknowns (..., u); what was not modelled is zero."""
         c, m, nodes = self._m.curves, self._m.marks, self._m.layout.node_count
         head, moved = x.shape[:-1], 3 * (nodes - 1)
-        still = np.zeros((*head, 1, 3))
-        theta = x[..., moved + 2 * nodes :]
+        theta = x[..., self._free :] if x.shape[-1] > self._free else np.zeros((*head, self._m.size))
         return Corrections(
-            np.concatenate([still, x[..., :moved].reshape(*head, -1, 3)], axis=-2),
+            np.concatenate([np.zeros((*head, 1, 3)), x[..., :moved].reshape(*head, -1, 3)], axis=-2),
             theta[..., : 3 * c].reshape(*head, c, 3),
             theta[..., 3 * c : 4 * c],
             theta[..., 4 * c : 4 * c + m],

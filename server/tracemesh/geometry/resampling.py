@@ -31,6 +31,10 @@ def _extended(curve: PlacedCurve, margin: float, used: Bools | None) -> tuple[Fl
         arc, quaternion = arc[used], quaternion[used]
     if not curve.closed:
         return arc, quaternion
+    if arc[0] == 0 and arc[-1] == curve.length and len(arc) > 2:  # the same place, measured twice
+        flip = -1.0 if quaternion[-1] @ quaternion[0] < 0 else 1.0
+        middle = normalized(quaternion[:1] + flip * quaternion[-1:])
+        arc, quaternion = arc[:-1], np.concatenate([middle, quaternion[1:-1]])
     n, length = len(arc), curve.length
     before = max(min(int(np.searchsorted(arc, length - margin)), n - _NEAREST - 1), 0)
     after = max(int(np.searchsorted(arc, margin, side="right")), _NEAREST + 1)

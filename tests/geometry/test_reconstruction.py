@@ -1,0 +1,339 @@
+"""The curve half end to end: known truth, convergence, what must not matter, and scans that cannot be used."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+from tracemesh.errors import Cancelled, ScanError
+from tracemesh.formats.meshes import read_mesh
+from tracemesh.formats.rawnet import read_rawnet
+from tracemesh.geometry.energy import Weights
+from tracemesh.geometry.evaluation import evaluate
+from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.reconstruction import NetworkParameters, NetworkReconstruction, reconstruct_network
+from tracemesh.geometry.rotations import exp
+from tracemesh.geometry.scan import CurveScan, Scan
+from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.simulation import exact_scan
+
+FIXED = NetworkParameters(step=0.012, stretch=0.0, bend=0.02, curve_bias="off")
+
+
+def exact(name: str = "leaf", spacing: float = 0.004) -> Scan:
+    return exact_scan(SHAPES[name](), spacing)
+
+
+def with_curve(scan: Scan, index: int, **fields: object) -> Scan:
+    curves = list(scan.curves)
+    curves[index] = replace(curves[index], **fields)
+    return Scan(tuple(curves))
+
+
+# data with known truth
+
+
+class Truth:
+    """Dense points on the true curves of a scan."""
+
+    def __init__(self, path: Path) -> None:
+        data = json.loads(path.read_text())
+        points = np.array(data["points"])
+        parts = [points[s["points"]] for s in data["segments"]]
+        dense = [CubicSpline(range(len(p)), p)(np.arange(0, len(p) - 0.95, 0.05)) for p in parts]
+        self.points = np.concatenate(dense)
+        self.diagonal = np.linalg.norm(np.ptp(points, axis=0))
+
+    def errors(self, points: np.ndarray) -> np.ndarray:
+        """Distances (n,) in % of the diagonal after rigid alignment, both being oriented alike to start with."""
+        tree, x = cKDTree(self.points), points - points.mean(axis=0) + self.points.mean(axis=0)
+        for _ in range(40):
+            y = self.points[tree.query(x)[1]]
+            a, b = x - x.mean(axis=0), y - y.mean(axis=0)
+            u, _, vt = np.linalg.svd(a.T @ b)
+            x = a @ u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt + y.mean(axis=0)
+        return 100 * tree.query(x)[0] / self.diagonal
+
+
+@pytest.mark.parametrize(
+    ("name", "mean"),
+    [("sphere", 0.05), ("torus", 0.05), ("cone", 0.04), ("bumpy", 0.07), ("lilium", 0.06), ("lilium7", 0.06)],
+)
+def test_noisy_scans_with_all_defaults(shared_data: Path, name: str, mean: float) -> None:
+    scan = read_rawnet((shared_data / f"scans/{name}-noisy.rawnet").read_text())
+    truth = Truth(shared_data / f"scans/{name}.truth.network.json")
+    assert truth.errors(reconstruct_network(scan).network.points).mean() < mean
+
+
+@pytest.mark.parametrize("name", ["cone", "lilium", "sphere", "torus", "bumpy", "lilium7"])
+def test_exact_scans(shared_data: Path, name: str) -> None:
+    scan = read_rawnet((shared_data / f"scans/{name}-exact.rawnet").read_text())
+    truth = Truth(shared_data / f"scans/{name}.truth.network.json")
+    coarse, fine = (NetworkParameters(step=share * truth.diagonal) for share in (0.016, 0.004))
+    assert truth.errors(reconstruct_network(scan, coarse).network.points).mean() < 0.03
+    assert truth.errors(reconstruct_network(scan, fine).network.points).mean() < 0.003
+
+
+def test_the_authors_polyline_is_reproduced_to_rounding(shared_data: Path) -> None:
+    result = reconstruct_network(read_rawnet((shared_data / "lilium.rawnet").read_text()))
+    vertices, faces = read_mesh((shared_data / "lilium.obj").read_bytes(), "obj")
+    found = evaluate(result.network.points, None, vertices, faces, align="rigid")
+    assert "chords" in result.report["parameters"]["tangents"]  # type: ignore[index]
+    assert found.mean < 0.002 and found.max < 0.01
+
+
+# convergence
+
+
+@pytest.mark.parametrize("name", ["leaf", "torus", "egg"])
+def test_exact_scans_converge_in_the_second_order_at_least(true_points: Callable, misfit: Callable, name: str) -> None:
+    curves, errors = SHAPES[name]().curves, []
+    for step in (0.04, 0.02):
+        network = reconstruct_network(exact(name, 0.002), NetworkParameters(step=step)).network
+        errors.append(misfit(network.points, true_points(network, curves)).mean())
+    assert np.log2(errors[0] / errors[1]) > 1.9
+
+
+# the network
+
+
+@pytest.mark.parametrize("name", sorted(SHAPES))
+def test_every_point_is_there_once_and_segments_run_from_node_to_node(name: str) -> None:
+    network = reconstruct_network(exact(name)).network
+    used = np.bincount(np.concatenate([s.points[1:-1] for s in network.segments]), minlength=len(network.points))
+    assert (used[np.setdiff1d(np.arange(len(used)), network.nodes)] == 1).all()
+    assert (used[network.nodes] == 0).all()
+    ends = {int(p) for s in network.segments for p in (s.points[0], s.points[-1])}
+    assert ends == set(network.nodes.tolist())
+    np.testing.assert_allclose(np.linalg.norm(network.normals, axis=1), 1, atol=1e-12)
+    edges = [np.linalg.norm(np.diff(network.points[s.points], axis=0), axis=1) for s in network.segments]
+    assert np.concatenate(edges).min() > 0.3 * np.median(np.concatenate(edges))
+
+
+def test_one_closed_curve_alone_has_no_node() -> None:
+    arc = np.linspace(0, 1, 200)
+    frames = exp(2 * np.pi * arc[:, None] * np.array([0.0, 0.0, 1.0]))
+    network = reconstruct_network(Scan((CurveScan(arc, frames[:, :, 0], -frames[:, :, 1], closed=True),))).network
+    assert len(network.nodes) == 0
+    assert network.segments[0].points[0] == network.segments[0].points[-1]
+    radius = np.linalg.norm(network.points - network.points.mean(axis=0), axis=1)
+    np.testing.assert_allclose(radius, 1 / (2 * np.pi), rtol=1e-4)
+
+
+def test_a_scan_under_way_is_a_network_with_a_loose_end() -> None:
+    scan = exact()
+    curve = scan.curves[1]
+    end = int(curve.node_samples[1]) - 20
+    begun = CurveScan(
+        curve.distance[:end], curve.tangent[:end], curve.normal[:end], curve.node_samples[:1], curve.node_ids[:1]
+    )
+    network = reconstruct_network(Scan((scan.curves[0], begun))).network
+    assert len(network.nodes) == len(scan.curves[0].node_ids)  # one of the closed curve's repeats, one is the loose end
+    assert [s.curve for s in network.segments].count(1) == 1
+
+
+# what must not matter: 1e-9 of the diagonal
+
+
+def same(first: CurveNetwork, second: CurveNetwork) -> None:
+    expected = first.points
+    moved = second.points - second.points[: len(second.nodes)].mean(axis=0)
+    np.testing.assert_allclose(
+        moved, expected - expected[: len(first.nodes)].mean(axis=0), rtol=0, atol=1e-9 * first.diagonal
+    )
+
+
+def noisy(faulty_scan: Callable, name: str = "leaf") -> Scan:
+    return faulty_scan(name, 0.003, seed=7, noise=0.02, heading=0.02, mark=0.001).scan
+
+
+@pytest.mark.parametrize("parameters", [FIXED, NetworkParameters(step=0.012)], ids=["fixed", "automatic"])
+def test_axes_of_the_world(faulty_scan: Callable, parameters: NetworkParameters) -> None:
+    scan, turn = noisy(faulty_scan), exp(np.array([2.0, 1.0, -0.5]))
+    turned = Scan(tuple(replace(c, tangent=c.tangent @ turn.T, normal=c.normal @ turn.T) for c in scan.curves))
+    first, second = (reconstruct_network(s, parameters).network for s in (scan, turned))
+    tolerance = 1e-9 if parameters is FIXED else 1e-7
+    np.testing.assert_allclose(second.points, first.points @ turn.T, rtol=0, atol=tolerance * first.diagonal)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1000.0])
+@pytest.mark.parametrize("fixed", [True, False])
+def test_unit_of_length(faulty_scan: Callable, unit: float, fixed: bool) -> None:
+    scan = noisy(faulty_scan)
+    scaled = Scan(tuple(replace(c, distance=unit * c.distance) for c in scan.curves))
+    lengths = {"step": 0.012, "stretch": 0.0, "bend": 0.02} if fixed else {}
+    parameters = [NetworkParameters(**{k: f * v for k, v in lengths.items()}) for f in (1.0, unit)]  # type: ignore[arg-type]
+    first, second = (reconstruct_network(s, p) for s, p in zip((scan, scaled), parameters, strict=True))
+    tolerance = 1e-9 * first.network.diagonal
+    np.testing.assert_allclose(second.network.points / unit, first.network.points, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(second.uncertainty / unit, first.uncertainty, rtol=1e-6)
+
+
+def test_numbers_of_nodes_and_where_distances_start(faulty_scan: Callable) -> None:
+    scan = noisy(faulty_scan)
+    others = Scan(tuple(replace(c, node_ids=3 * c.node_ids + 5, distance=c.distance + 2.5) for c in scan.curves))
+    same(*(reconstruct_network(s, FIXED).network for s in (scan, others)))
+
+
+def test_order_of_curves(faulty_scan: Callable) -> None:
+    scan = noisy(faulty_scan)
+    first = reconstruct_network(scan, FIXED).network
+    second = reconstruct_network(Scan(scan.curves[::-1]), FIXED).network
+    order = np.concatenate([s.points for s in first.segments])
+    back = {c: [s for s in second.segments if s.curve == len(scan.curves) - 1 - c] for c in range(len(scan.curves))}
+    found = np.concatenate([s.points for c in range(len(scan.curves)) for s in back[c]])
+    np.testing.assert_allclose(second.points[found], first.points[order], rtol=0, atol=1e-9 * first.diagonal)
+
+
+def backwards(curve: CurveScan) -> CurveScan:
+    samples = len(curve.distance) - 1 - curve.node_samples[::-1]
+    return replace(
+        curve,
+        distance=-curve.distance[::-1],
+        tangent=-curve.tangent[::-1],
+        normal=curve.normal[::-1],
+        node_samples=samples,
+        node_ids=curve.node_ids[::-1],
+    )
+
+
+@pytest.mark.parametrize("name", ["leaf", "egg"])
+def test_direction_of_curves(faulty_scan: Callable, name: str) -> None:
+    scan = noisy(faulty_scan, name)
+    turned = Scan(tuple(backwards(c) if i % 2 else c for i, c in enumerate(scan.curves)))
+    first, second = (reconstruct_network(s, FIXED).network for s in (scan, turned))
+    for c in range(len(scan.curves)):
+        a = np.concatenate([first.points[s.points] for s in first.segments if s.curve == c])
+        b = [second.points[s.points] for s in second.segments if s.curve == c]
+        b = [s[::-1] for s in b[::-1]] if c % 2 else b
+        np.testing.assert_allclose(np.concatenate(b), a, rtol=0, atol=1e-9 * first.diagonal)
+
+
+def started_at(curve: CurveScan, mark: int) -> CurveScan:
+    """The same closed curve, scanned from another of its nodes on; its first and last sample are one."""
+    cut, last = int(curve.node_samples[mark]), len(curve.distance) - 1
+    order = np.r_[cut:last, 0 : cut + 1]
+    distance = curve.distance[order] - curve.distance[cut]
+    distance[last - cut :] += curve.distance[-1] - curve.distance[0]
+    ids = np.r_[curve.node_ids[mark:-1], curve.node_ids[: mark + 1]]
+    samples = np.r_[curve.node_samples[mark:-1] - cut, curve.node_samples[: mark + 1] + last - cut]
+    return replace(
+        curve,
+        distance=distance,
+        tangent=curve.tangent[order],
+        normal=curve.normal[order],
+        node_samples=samples,
+        node_ids=ids,
+    )
+
+
+@pytest.mark.parametrize("mark", [1, 2])
+def test_start_of_a_closed_curve(mark: int) -> None:
+    scan = exact()
+    moved = with_curve(scan, 0, **vars(started_at(scan.curves[0], mark)))
+    first, second = (reconstruct_network(s, FIXED).network for s in (scan, moved))
+    tree = cKDTree(first.points)
+    assert len(first.points) == len(second.points)
+    assert tree.query(second.points)[0].max() < 1e-9 * first.diagonal
+
+
+# re-solving, progress, thesis weights
+
+
+def test_solving_again_with_other_weights_is_solving_anew(faulty_scan: Callable) -> None:
+    scan = noisy(faulty_scan)
+    kept = NetworkReconstruction(scan, NetworkParameters(step=0.012))
+    kept.solve()
+    again = kept.solve(Weights(0.01, 0.05)).network
+    anew = reconstruct_network(scan, NetworkParameters(step=0.012, stretch=0.01, bend=0.05)).network
+    np.testing.assert_allclose(again.points, anew.points, rtol=0, atol=1e-8 * anew.diagonal)
+
+
+def test_progress_rises_and_may_cancel() -> None:
+    told: list[tuple[str, float]] = []
+    reconstruct_network(exact(), progress=lambda stage, share: told.append((stage, share)))
+    assert len(told) >= 6 and told[0][1] == 0
+    assert all(a[1] < b[1] < 1 for a, b in pairwise(told))
+
+    def cancel(stage: str, share: float) -> None:
+        if share > 0.5:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        reconstruct_network(exact(), progress=cancel)
+
+
+def test_the_report_is_json_and_says_what_was_done(faulty_scan: Callable) -> None:
+    result = reconstruct_network(faulty_scan("leaf", seed=3, noise=0.02, heading=0.02).scan)
+    report = json.loads(json.dumps(result.report))
+    assert report["sizes"]["points"] == len(result.network.points) == len(result.frames)
+    assert report["parameters"]["bend_m"] > 0
+    assert report["curve_bias"]["on"]
+    assert report["frame_noise_deg"] == pytest.approx(np.degrees(0.02), rel=0.1)
+    assert set(report["seconds"]) >= {"cleaning", "weighing", "closing", "smoothing", "positions"}
+
+
+def test_thesis_weights_are_lambda_and_mu_of_one() -> None:
+    thesis = reconstruct_network(exact(), NetworkParameters(weights="thesis", curve_bias="off"))
+    given_ones = reconstruct_network(exact(), NetworkParameters(stretch=1.0, bend=1.0, curve_bias="off"))
+    np.testing.assert_array_equal(thesis.network.points, given_ones.network.points)
+
+
+# scans that cannot be used
+
+
+def test_two_pieces_are_named() -> None:
+    far = tuple(replace(c, node_ids=c.node_ids + 50) for c in exact("egg").curves)
+    with pytest.raises(ScanError, match=r"2 pieces.*curve 1, curve 2.*curve 6"):
+        reconstruct_network(Scan(exact().curves + far))
+
+
+def test_a_closed_curve_that_is_not_is_named() -> None:
+    arc = np.linspace(0, 1, 100)
+    frames = exp(np.pi * arc[:, None] * np.array([0.0, 0.0, 1.0]))
+    half = CurveScan(arc, frames[:, :, 0], frames[:, :, 1], closed=True)
+    with pytest.raises(ScanError, match=r"curve 1 is marked as closed, but ends 0\.637 m from where it began \(64 %"):
+        reconstruct_network(Scan((half,)))
+
+
+def test_an_empty_scan_and_senseless_parameters_are_refused() -> None:
+    with pytest.raises(ScanError, match="no curve"):
+        reconstruct_network(Scan(()))
+    for wrong in ({"step": 0.0}, {"step": np.nan}, {"step_fraction": -1.0}, {"bend": -0.1}):
+        with pytest.raises(ScanError, match=next(iter(wrong))):
+            reconstruct_network(exact(), NetworkParameters(**wrong))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+def test_any_small_scan_gives_a_finite_network_or_a_clear_error(data: st.DataObject) -> None:
+    random = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    curves = []
+    for _ in range(data.draw(st.integers(1, 3))):
+        n = data.draw(st.integers(0, 12))
+        marks = (
+            np.sort(random.choice(n, min(n, data.draw(st.integers(0, 4))), replace=data.draw(st.booleans())))
+            if n
+            else []
+        )
+        steps = random.choice([0.0, 1e-9, 0.01, 0.02, -0.01], n, p=[0.1, 0.05, 0.4, 0.4, 0.05])
+        vectors = random.standard_normal((2, n, 3)) * data.draw(st.sampled_from([1.0, 1e-3]))
+        if n and data.draw(st.integers(0, 9)) == 0:
+            vectors[0, 0, 0] = data.draw(st.sampled_from([np.nan, np.inf, 0.0]))
+        ids = random.integers(0, 4, len(marks))
+        closed = data.draw(st.booleans())
+        curves.append(CurveScan(np.cumsum(steps), *vectors, np.array(marks, np.int64), ids, closed=closed))
+    try:
+        result = reconstruct_network(Scan(tuple(curves)))
+    except ScanError as error:
+        assert "curve" in str(error)
+    else:
+        assert np.isfinite(result.network.points).all() and np.isfinite(result.uncertainty).all()
