@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from tracemesh.errors import InputError
-from tracemesh.formats.meshes import read_mesh, write_mesh
+from tracemesh.formats.meshes import read_mesh, write_mesh, write_triangles
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.shapes import leaf
 
@@ -128,3 +128,14 @@ def test_bad_files_are_input_errors(content: bytes, extension: str, words: str) 
 def test_an_unknown_format_is_refused(mesh: Mesh) -> None:
     with pytest.raises(InputError, match="got 'dae'"):
         write_mesh(mesh, "dae")
+
+
+@pytest.mark.parametrize("extension", ["obj", "ply", "stl"])
+def test_bare_triangles_can_be_written(mesh: Mesh, extension: str) -> None:
+    vertices, faces = read_mesh(write_triangles(mesh.vertices, mesh.faces, extension), extension)
+    np.testing.assert_allclose(vertices[faces], mesh.vertices[mesh.faces], atol=1e-7)
+
+
+def test_bare_triangles_have_no_glb() -> None:
+    with pytest.raises(InputError, match="got 'glb'"):
+        write_triangles(np.eye(3), np.array([[0, 1, 2]]), "glb")

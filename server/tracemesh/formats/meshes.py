@@ -51,9 +51,10 @@ def write_triangles(vertices: Floats, faces: Ints, extension: str) -> bytes:
     """OBJ, PLY or STL file (z up) of bare triangles; raises InputError for any other extension."""
     if extension not in ("obj", "ply", "stl"):
         raise InputError(f"wanted a mesh format among obj, ply, stl, got {extension!r}")
-    options = {"digits": OBJ_DIGITS} if extension == "obj" else {}
-    content: str | bytes = _trimesh(vertices, faces).export(file_type=extension, **options)
-    return content.encode() if isinstance(content, str) else content
+    triangles = _trimesh(vertices, faces)
+    if extension == "obj":
+        return str(export_obj(triangles, header="metres, z up", digits=OBJ_DIGITS)).encode()
+    return bytes(export_ply(triangles) if extension == "ply" else export_stl(triangles))
 
 
 def read_mesh(content: bytes, extension: str, source: str = "") -> tuple[Floats, Ints]:
