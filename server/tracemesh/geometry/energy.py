@@ -8,6 +8,7 @@ is X_k <- X_k exp(w_k). Its Hessian is exact for the first two terms and Gauss-N
 """
 
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,9 +128,11 @@ class EnergyPoint:
         root = 0.5 * np.sqrt(self._bend_weight)
         out = (root / s.h_out)[:, None, None] * curl[s.edge_out]
         into = (root / s.h_in)[:, None, None] * curl[s.edge_in]
-        jacobian = np.concatenate([into, -out - _transposed(into), _transposed(out)], axis=2)
-        product = (_transposed(jacobian) @ jacobian).reshape(-1, 3, 3, 3, 3)
-        return np.concatenate([product[:, i, :, j] for i in range(3) for j in range(i, 3)])
+        jacobian = [into, -out - _transposed(into), _transposed(out)]
+        blocks = np.empty((6, len(into), 3, 3))
+        for k, (i, j) in enumerate(combinations_with_replacement(range(3), 2)):
+            np.matmul(_transposed(jacobian[i]), jacobian[j], out=blocks[k])
+        return blocks.reshape(-1, 3, 3)
 
     def _node_blocks(self) -> Floats:
         (p, q), weight = self._s.pair.T, 2 * self._stiffness

@@ -1,6 +1,6 @@
 """Frames along all curves of a network, one after the other, cut into segments at nodes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -104,3 +104,19 @@ class NetworkSamples:
 
     layout: Layout
     frames: Floats
+
+    def first_curves(self, count: int) -> "NetworkSamples":
+        """Only the first curves, at least one."""
+        full = self.layout
+        rows = full.first[count]
+        marks = full.marks[full.marks < rows]
+        layout = replace(
+            full,
+            arc=full.arc[:rows],
+            first=full.first[: count + 1],
+            closed=full.closed[:count],
+            boundary=full.boundary[:count],
+            marks=marks,
+            nodes=full.nodes[: len(marks)],
+        )
+        return NetworkSamples(layout, self.frames[:rows])

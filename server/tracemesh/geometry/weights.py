@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _FOLDS = 5
+_ENOUGH_ROWS = 10_000
 _RUNS_PER_STEP = 4
 _BENDS = 2.0 ** np.arange(-2, 7)  # trials, in steps
 _LEAST_TILT, _LEAST_DRIFT = 2e-4, 1e-4  # rad and relative: what no device does better, were its data free of noise
@@ -81,11 +82,19 @@ def _vertex(logs: list[float], errors: list[float]) -> float:
     return float(np.clip(b - slope * (c - a) / 2 / curvature, a, c)) if curvature > 0 else float(b)
 
 
+def _trials(curves: Sequence[PlacedCurve], samples: NetworkSamples, step: float) -> _Trials | None:
+    """Trials on the first curves of a large network; None for one that is small enough as a whole."""
+    few = curves[: int(np.searchsorted(samples.layout.first, _ENOUGH_ROWS))]
+    if len(few) == len(curves):
+        return None
+    part = samples.first_curves(len(few))
+    return _Trials(DevelopedSpline(part), measured_offsets(few, part), _folds(few, step))
+
+
 def choose_weights(curves: Sequence[PlacedCurve], samples: NetworkSamples, step: float) -> Choice:
-    """Weights that predict left-out frames best."""
-    offsets = measured_offsets(curves, samples)
-    spline = DevelopedSpline(samples)
-    trials = _Trials(spline, offsets, _folds(curves, step))
+    """Weights that predict left-out frames best, on as many of the curves as it takes to know them well."""
+    offsets, spline = measured_offsets(curves, samples), DevelopedSpline(samples)
+    trials = _trials(curves, samples, step) or _Trials(spline, offsets, _folds(curves, step))
     weights = _search(trials, step)
     smooth = spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(weights))
     return Choice(weights, trials.error(weights), spline.frames(smooth))
