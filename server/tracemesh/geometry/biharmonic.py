@@ -7,9 +7,8 @@ once.
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
-from tracemesh.errors import SurfaceError
+from tracemesh.geometry.factorisation import factorised
 from tracemesh.geometry.laplacian import Laplacian
 from tracemesh.geometry.network import Floats
 
@@ -27,12 +26,7 @@ class BiharmonicSolver:
         self._gradient = (laplacian.stiffness[fixed:] @ sparse.diags(weight)).tocsr()
         matrix = (self._gradient @ laplacian.stiffness).tocsc()
         self._coupling = matrix[:, :fixed]
-        try:
-            self._factor = splu(
-                matrix[:, fixed:], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options={"SymmetricMode": True}
-            )
-        except RuntimeError as error:
-            raise SurfaceError(f"the surface is not determined by the network: {error}") from None
+        self._factor = factorised(matrix[:, fixed:])
 
     def solve(self, known: Floats, laplacian_target: Floats | None = None) -> Floats:
         """(n, m) values with L V near a target.

@@ -6,10 +6,13 @@ Every error names a segment by the nodes at its ends ("segment 3-7 of curve 1") 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from tracemesh.errors import NetworkError
+from tracemesh.geometry.bridges import partners
 from tracemesh.geometry.cycles import Cycle, loop_points, trace_cycles
-from tracemesh.geometry.network import CurveNetwork, Segment
+from tracemesh.geometry.network import CurveNetwork, Ints, Segment
 
 # An opening seen from outside turns by -2 pi if the surface around it is flat, and by more the more it curves inwards.
 # Below this, rad, a cycle of an untagged network is taken for an opening: a face would need more curvature than a
@@ -22,12 +25,14 @@ UNIT_TOLERANCE = 1e-3
 class CellComplex:
     """A network whose every segment bounds one face (boundary) or two.
 
-    network: as given, with inferred boundary tags. faces: cycles to be spanned. openings: cycles that stay open.
+    network: as given, with inferred boundary tags. faces: cycles to be spanned. partners: faces, by index, that are the
+    two loops of one face. openings: cycles that stay open.
     inferred: whether the boundary was found instead of given.
     """
 
     network: CurveNetwork
     faces: tuple[Cycle, ...]
+    partners: dict[int, int]
     openings: tuple[Cycle, ...]
     inferred: bool
 
@@ -52,10 +57,18 @@ def cell_complex(network: CurveNetwork) -> CellComplex:
     if inferred:
         network = _with_inferred_boundary(network, cycles)
         inferred = any(segment.boundary for segment in network.segments)
-    openings = _openings(network, cycles)
-    faces = tuple(cycle for cycle in cycles if cycle not in openings)
-    _check_tags(network, faces)
-    return CellComplex(network, faces, openings, inferred)
+    pieces = _pieces(network)
+    paired = partners(network, cycles) if pieces.max() > 0 else {}
+    openings = _openings(network, cycles, paired)
+    faces = [number for number in range(len(cycles)) if number not in openings]
+    _check_tags(network, tuple(cycles[number] for number in faces))
+    place = {number: k for k, number in enumerate(faces)}
+    loops = {place[a]: place[b] for a, b in paired.items() if a in place and b in place}
+    complex_ = CellComplex(
+        network, tuple(cycles[k] for k in faces), loops, tuple(cycles[k] for k in sorted(openings)), inferred
+    )
+    _check_connected(complex_, pieces)
+    return complex_
 
 
 def segment_name(network: CurveNetwork, index: int) -> str:
@@ -137,17 +150,44 @@ def _with_inferred_boundary(network: CurveNetwork, cycles: tuple[Cycle, ...]) ->
     return replace(network, segments=segments)
 
 
-def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...]) -> tuple[Cycle, ...]:
-    """Cycles along boundary segments only. Of the two sides of a lone closed boundary curve, the one that turns
-    less.
+def _pieces(network: CurveNetwork) -> Ints:
+    """(number of segments,) number of the connected piece of curves that a segment belongs to."""
+    count = len(network.points)
+    ends = np.array([(segment.points[0], segment.points[-1]) for segment in network.segments])
+    graph = sparse.coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (count, count))
+    labels = csgraph.connected_components(graph, directed=False)[1][ends[:, 0]]
+    return np.unique(labels, return_inverse=True)[1]
+
+
+def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...], paired: dict[int, int]) -> set[int]:
+    """Cycles along boundary segments only. Of the two sides of a lone closed boundary curve, the one that faces no
+    other
+    curve, or else the one that turns less.
     """
-    candidates = [c for c in cycles if all(network.segments[side.segment].boundary for side in c.sides)]
-    openings: list[Cycle] = []
-    for cycle in sorted(candidates, key=lambda c: c.turning):
-        taken = {side.segment for opening in openings for side in opening.sides}
-        if taken.isdisjoint(side.segment for side in cycle.sides):
-            openings.append(cycle)
-    return tuple(openings)
+    candidates = [
+        number for number, c in enumerate(cycles) if all(network.segments[side.segment].boundary for side in c.sides)
+    ]
+    openings: set[int] = set()
+    taken: set[int] = set()
+    for number in sorted(candidates, key=lambda k: (k in paired, cycles[k].turning)):
+        segments = {side.segment for side in cycles[number].sides}
+        if taken.isdisjoint(segments):
+            openings.add(number)
+            taken |= segments
+    return openings
+
+
+def _check_connected(complex_: CellComplex, pieces: Ints) -> None:
+    """Every piece of the network is joined to the others by faces with two loops."""
+    pairs = [[pieces[complex_.faces[k].sides[0].segment] for k in pair] for pair in complex_.partners.items()]
+    first, second = np.array(pairs, np.int64).reshape(-1, 2).T
+    size = int(pieces.max()) + 1
+    graph = sparse.coo_matrix((np.ones(len(first)), (first, second)), (size, size))
+    joined = csgraph.connected_components(graph, directed=False)[1]
+    apart = np.flatnonzero(joined != joined[0])
+    if len(apart):
+        here, there = (segment_name(complex_.network, int(np.argmax(pieces == piece))) for piece in (0, apart[0]))
+        raise NetworkError(f"no curve and no face connects {here} and {there}: connect them by a curve")
 
 
 def _check_tags(network: CurveNetwork, faces: tuple[Cycle, ...]) -> None:

@@ -19,7 +19,9 @@ def subdivided(network: CurveNetwork, spacing: float) -> CurveNetwork:
     for segment in network.segments:
         between, facing, parts = _points_between(network, segment, spacing)
         new = count + np.arange(len(between))
-        segments.append(replace(segment, points=np.insert(segment.points, np.repeat(1 + np.arange(len(parts)), parts - 1), new)))
+        segments.append(
+            replace(segment, points=np.insert(segment.points, np.repeat(1 + np.arange(len(parts)), parts - 1), new))
+        )
         points.append(between)
         normals.append(facing)
         count += len(between)

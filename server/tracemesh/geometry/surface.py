@@ -10,13 +10,14 @@ import numpy as np
 from tracemesh.errors import SurfaceError
 from tracemesh.geometry.cell_complex import CellComplex, cell_complex
 from tracemesh.geometry.curvature import mean_curvature
-from tracemesh.geometry.laplacian import cotangent_laplacian
+from tracemesh.geometry.laplacian import cotangent_laplacian, surface_laplacian
 from tracemesh.geometry.linear_surface import linear_surface, rebuilt_surface
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
 from tracemesh.geometry.patches import PatchMesh, triangulate_patches, unrolled_well
 from tracemesh.geometry.quality import mesh_quality
 from tracemesh.geometry.refinement import refine
+from tracemesh.geometry.soft_constraints import softened_points
 from tracemesh.geometry.subdivision import subdivided
 
 Progress = Callable[[str, float], None]
@@ -31,9 +32,12 @@ class SurfaceParameters:
 
     mesh_size: m, edge length inside the patches; None takes the network's own spacing. refinement: "auto" refines
     where the network gives evidence for it, "on" always, "off" keeps the linear solution, which is faster.
+    soft: length over which the network's positions are smoothed, in its own edge lengths; 2 suits a noisy network, None
+    interpolates the points.
     """
 
     mesh_size: float | None = None
+    soft: float | None = None
     refinement: Literal["auto", "on", "off"] = "auto"
 
 
@@ -92,14 +96,24 @@ def _linear(
                 break
             vertices, spread = rebuilt_surface(vertices, patches.faces, points, normals)
         last = (patches, vertices)
+    if parameters.soft is not None:
+        points = _softened(complex_.network, patches, vertices, spread, parameters.soft)
     for step in range(REBUILDS):
         stages.begin("rebuild", 0.35 + 0.15 * step / REBUILDS)
         rebuilt, spread = rebuilt_surface(vertices, patches.faces, points, normals)
         # Along the normal only: sideways nothing holds the vertices, and triangles would drift out of shape.
         vertices = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
+        vertices[: len(points)] = points
     if not np.isfinite(vertices).all():
         raise SurfaceError("the surface is not determined by the network: positions are not finite")
     return patches, vertices, spread
+
+
+def _softened(network: CurveNetwork, patches: PatchMesh, vertices: Floats, normals: Floats, soft: float) -> Floats:
+    """Positions of the network's points that the surface would rather have."""
+    edges = [np.linalg.norm(np.diff(network.points[s.points], axis=0), axis=1) for s in network.segments]
+    laplacian = surface_laplacian(vertices, patches.faces)
+    return softened_points(network, laplacian, patches.faces, vertices, normals, soft * np.concatenate(edges).mean())
 
 
 def _report(mesh: Mesh, complex_: CellComplex, stages: "_Stages") -> dict[str, object]:
@@ -107,7 +121,7 @@ def _report(mesh: Mesh, complex_: CellComplex, stages: "_Stages") -> dict[str, o
     warnings = ["no curve was marked as boundary: found it from the turning of the curves"] if complex_.inferred else []
     if quality.inverted_faces:
         warnings.append(f"{quality.inverted_faces} triangles are turned over: the network may need another curve there")
-    return {**asdict(quality), "patches": len(complex_.faces), "stage_times": stages.times, "warnings": warnings}
+    return {**asdict(quality), "patches": int(mesh.patch.max()) + 1, "stage_times": stages.times, "warnings": warnings}
 
 
 class _Stages:
