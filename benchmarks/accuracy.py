@@ -18,6 +18,7 @@ from tracemesh.geometry.surface import span_surface
 
 STEPS = (6.4, 3.2, 1.6, 0.8, 0.4)
 RAW_STEP = 1e-3  # of the diagonal, between the samples of a built-in shape's exact scan
+_ABOVE = 3.0  # times the error at the finest step, where samples and truth end: only such steps tell an order
 SCHEMES: dict[str, tuple[float, float] | None] = {
     "automatic": None,
     "1, 1": (1, 1),
@@ -49,12 +50,13 @@ def steps(data: Data, names: tuple[str, ...] = tuple(SHAPES), percent: tuple[flo
     rows += [_steps_row(known, percent) for known in data.scans("exact")]
     columns = (
         Column("exact scan"),
-        *(Column(f"h = {p} %", ".4f") for p in percent),
+        *(Column(f"h = {p} %", ".5f") for p in percent),
         Column("order", ".2f"),
-        Column(f"largest at {percent[-1]} %", ".4f"),
+        Column(f"largest at {percent[-1]} %", ".5f"),
     )
     note = """Mean distance of the network's points to the true curves, % of the diagonal, all choices automatic
-        (figures 3.15-3.17). Order: exponent of the least-squares fit error ~ h^order."""
+        (figures 3.15-3.17). Order: exponent of the least-squares fit error ~ h^order over the steps whose error is more
+        than 3 times that at the finest, where the samples and the polylines of the truth are the limit."""
     return Table("steps", "Networks from exact scans, against the step", columns, tuple(rows), (note,))
 
 
@@ -112,7 +114,8 @@ def _steps_row(known: KnownScan, percent: tuple[float, ...]) -> tuple[Cell, ...]
         network = reconstruct_network(known.scan, NetworkParameters(step=p / 100 * known.diagonal)).network
         errors.append(network_error(network, truth, known.diagonal))
     means = [e.mean for e in errors]
-    return (known.name, *means, fitted_exponent(percent, means), errors[-1].largest)
+    above = [(p, mean) for p, mean in zip(percent, means, strict=True) if mean > _ABOVE * means[-1]]
+    return (known.name, *means, fitted_exponent(*zip(*above, strict=True)) if above else None, errors[-1].largest)
 
 
 def _weights_row(known: KnownScan, scheme: str, percent: tuple[float, ...]) -> tuple[Cell, ...]:

@@ -13,11 +13,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def warm_seconds(work: Callable[[], object], repeats: int = 5) -> float:
-    """Median time of some calls, after one that does not count."""
+def warm_seconds(work: Callable[[], object], repeats: int = 5, limit: float = 10.0) -> float:
+    """Median time of some calls, after one that does not count; no further call is begun after `limit` seconds."""
+    start = perf_counter()
     work()
-    times = []
-    for _ in range(repeats):
+    times: list[float] = []
+    while not times or (len(times) < repeats and perf_counter() - start < limit):
         begin = perf_counter()
         work()
         times.append(perf_counter() - begin)

@@ -9,12 +9,13 @@ from benchmarks.thesis_energy import ThesisEnergy
 from benchmarks.times import THESIS, known_scan, step_for
 from benchmarks.trust_region import TIME_LIMIT, trust_region
 from tracemesh.geometry.cleaning import clean_curves
-from tracemesh.geometry.energy import Stencil, Weights
+from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.placement import place_curve, uniform_layout
 from tracemesh.geometry.regression import RegressionSolver
 from tracemesh.geometry.resampling import resample
 from tracemesh.geometry.samples import NetworkSamples
 from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.stencil import Stencil
 
 COLUMNS = (
     Column("scan"),

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.measuring import Floats
-from tracemesh.geometry.energy import Stencil, Weights
+from tracemesh.geometry.energy import Weights
+from tracemesh.geometry.stencil import Stencil
 
 
 @dataclass(frozen=True)
