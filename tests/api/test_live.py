@@ -11,7 +11,7 @@ import pytest
 from tracemesh.api.live.drawing import SPACING
 
 
-def watch(socket: Any, until: Callable[[dict[str, Any]], bool], limit: int = 150) -> list[dict[str, Any]]:
+def watch(socket: Any, until: Callable[[dict[str, Any]], bool], limit: int = 100) -> list[dict[str, Any]]:
     """Messages up to and including the first that fits."""
     seen: list[dict[str, Any]] = []
     for _ in range(limit):
@@ -79,6 +79,7 @@ def test_a_curve_starts_at_its_known_node(server: Any, ride: Any, line: Any) -> 
     """The second curve begins at node 1, which is at the end of the first one."""
     session = server.new_session()
     with server.connect(f"/sessions/{session}/live") as socket:
+        watch(socket, is_type("live.snapshot"))
         rider = ride("attach", session)
         first = line(100)
         second = [m for m in line(100, curve=1, first_seq=len(first)) if m["type"] != "node"]

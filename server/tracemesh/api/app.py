@@ -13,6 +13,7 @@ from starlette.middleware import Middleware
 from tracemesh.api.access import Access
 from tracemesh.api.errors import install_handlers
 from tracemesh.api.live.hub import Hub
+from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
 from tracemesh.api.routes import curves, ingest, live, pages, reconstructions, recordings, sessions
 from tracemesh.api.services import Services
@@ -66,18 +67,21 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
 
     def observe(state: RecordingState, message: Recorded) -> None:
         hub.accepted(state, message)
+        previewer.forget(state.session.id)
 
     def tell(reconstruction: Reconstruction) -> None:
         loop.call_soon_threadsafe(hub.progressed, reconstruction)
 
     recorder = Recorder(database, settings.max_session_bytes, observe)
     hub = Hub(database, settings.resolved_database_url, recorder.flush)
+    previewer = Previewer(database, recorder.flush)
     runner = JobRunner(settings, database, tell)
     store = ArtifactStore(settings.artifact_dir)
     try:
-        yield Services(settings, database, store, recorder, hub, runner, loop)
+        yield Services(settings, database, store, recorder, hub, previewer, runner, loop)
     finally:
         await asyncio.to_thread(runner.close)
         await hub.close()
+        await previewer.close()
         await recorder.close()
         database.close()

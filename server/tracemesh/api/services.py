@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session as Transaction
 from starlette.requests import HTTPConnection
 
 from tracemesh.api.live.hub import Hub
+from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
 from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
@@ -26,8 +27,14 @@ class Services:
     artifacts: ArtifactStore
     recorder: Recorder
     hub: Hub
+    previewer: Previewer
     runner: JobRunner
     loop: asyncio.AbstractEventLoop
+
+    def edited(self, session: str) -> None:
+        """Curves or marks of a session were edited; from any thread."""
+        self.loop.call_soon_threadsafe(self.previewer.forget, session)
+        self.loop.call_soon_threadsafe(self.hub.edited, session)
 
 
 def services(connection: HTTPConnection) -> Services:

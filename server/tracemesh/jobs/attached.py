@@ -14,6 +14,7 @@ from tracemesh.geometry.scan import CurveScan, Floats, Scan
 from tracemesh.storage.curves import curve_rows
 from tracemesh.storage.database import Database
 from tracemesh.storage.scans import load_scan
+from tracemesh.wire.resources import ReconstructionParameters
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class SolvedNetwork:
 
     curves: dict[int, SolvedCurve]
     nodes: dict[int, Floats]
+    report: dict[str, object]
 
 
 def solve_attached(database_url: str, session: str) -> SolvedNetwork | None:
@@ -41,7 +43,8 @@ def solve_attached(database_url: str, session: str) -> SolvedNetwork | None:
             ended = {row.index for row in curve_rows(transaction, session) if row.ended}
         ready = [i for i, c in enumerate(scan.curves) if len(c.node_samples) > 1 or indices[i] in ended]
         chosen = largest_piece(scan.curves, ready)
-        return _solve(Scan(tuple(scan.curves[i] for i in chosen)), [indices[i] for i in chosen]) if chosen else None
+        piece = Scan(tuple(scan.curves[i] for i in chosen))
+        return solve_network(piece, [indices[i] for i in chosen]) if chosen else None
     except ScanError:
         return None
     finally:
@@ -60,18 +63,22 @@ def largest_piece(curves: Sequence[CurveScan], candidates: Sequence[int]) -> lis
     return max(members, key=lambda piece: (sum(len(curves[i].distance) for i in piece), -piece[0]), default=[])
 
 
-def _solve(scan: Scan, indices: Sequence[int]) -> SolvedNetwork | None:
+def solve_network(
+    scan: Scan, indices: Sequence[int], parameters: ReconstructionParameters | None = None
+) -> SolvedNetwork:
+    """The network of a scan whose curves have these indices in the session; raises ScanError."""
     from tracemesh.geometry.reconstruction import reconstruct_network
+    from tracemesh.pipeline import network_parameters
 
-    network = reconstruct_network(scan).network
+    result = reconstruct_network(scan, network_parameters(parameters or ReconstructionParameters()))
+    network = result.network
     numbers = np.unique(np.concatenate([curve.node_ids for curve in scan.curves]))
-    if len(network.nodes) < len(numbers):
-        return None
     curves = {
         index: SolvedCurve(_along(network, i), _last_sample(curve))
         for i, (index, curve) in enumerate(zip(indices, scan.curves, strict=True))
     }
-    return SolvedNetwork(curves, {int(n): network.points[p] for n, p in zip(numbers, network.nodes, strict=False)})
+    nodes = {int(n): network.points[p] for n, p in zip(numbers, network.nodes, strict=False)}
+    return SolvedNetwork(curves, nodes, result.report)
 
 
 def _along(network: CurveNetwork, curve: int) -> Floats:

@@ -89,6 +89,14 @@ class LiveNetwork(Message):
     nodes: list[NodePosition]
 
 
+class Preview(Message):
+    """Answer to POST /sessions/{session}/preview: the network that these parameters give, without its surface."""
+
+    curves: list[LiveCurve]
+    nodes: list[NodePosition]
+    report: dict[str, object] = Field(description="what was chosen and found, as in report.json")
+
+
 class LiveReconstruction(Message):
     """A reconstruction was created, made progress, or ended."""
 

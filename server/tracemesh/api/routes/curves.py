@@ -30,5 +30,5 @@ def update(session: Identifier, index: Index, change: CurveUpdate, services: Use
     """Change what the body names; the samples stay as they were sent."""
     with services.database.write() as transaction:
         changed = curves.update_curve(transaction, session, index, change)
-    services.loop.call_soon_threadsafe(services.hub.edited, session)
+    services.edited(session)
     return changed

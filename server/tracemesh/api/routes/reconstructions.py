@@ -2,13 +2,14 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import FileResponse
 
 from tracemesh.api.services import Reading, UseServices
 from tracemesh.storage import reconstructions
 from tracemesh.storage.artifacts import MEDIA_TYPES, artifact_row
 from tracemesh.wire.base import Identifier
+from tracemesh.wire.live import Preview
 from tracemesh.wire.resources import Reconstruction, ReconstructionParameters
 
 router = APIRouter(tags=["reconstructions"])
@@ -28,6 +29,17 @@ def create(
     services.loop.call_soon_threadsafe(services.hub.progressed, made)
     response.headers["Location"] = f"/api/v1/reconstructions/{made.id}"
     return made
+
+
+@router.post("/sessions/{session}/preview")
+async def preview(
+    session: Identifier,
+    services: UseServices,
+    parameters: ReconstructionParameters | None = None,
+    client: Annotated[str, Query(max_length=64, description="only its newest wish is answered")] = "",
+) -> Preview:
+    """The network with these parameters, at once; 409 when the same client asked for another one meanwhile."""
+    return await services.previewer.solve(session, client, parameters or ReconstructionParameters())
 
 
 @router.get("/sessions/{session}/reconstructions")

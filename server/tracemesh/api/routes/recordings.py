@@ -38,7 +38,7 @@ async def upload(session: Identifier, request: Request, services: UseServices, r
     content = await _body(request, services.settings.max_upload_bytes)
     parsed = await run_in_threadpool(parse_upload, content, session)
     await store_upload(services.recorder, parsed)
-    services.hub.edited(session)
+    services.edited(session)
     response.headers["Location"] = f"/api/v1/sessions/{session}/recordings/{parsed.hello.recording}"
     return await run_in_threadpool(_summary, services, session, parsed.hello.recording)
 

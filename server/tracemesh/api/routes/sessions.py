@@ -51,3 +51,4 @@ def update(session: Identifier, change: SessionUpdate, transaction: Writing) -> 
 async def delete(session: Identifier, services: UseServices) -> None:
     """Delete a session with everything in it; devices that record into it are cut off."""
     await services.recorder.delete_session(session)
+    services.edited(session)

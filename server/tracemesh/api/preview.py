@@ -1,0 +1,110 @@
+"""The network while somebody moves a slider: no queue, no files; only the newest wish of each client is worked on."""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Sequence
+from concurrent.futures.process import BrokenProcessPool
+
+from tracemesh.api.live.drawing import flat
+from tracemesh.errors import Conflict, TracemeshError
+from tracemesh.geometry.scan import Floats, Scan
+from tracemesh.jobs.attached import SolvedNetwork, solve_network
+from tracemesh.jobs.slot import Slot
+from tracemesh.storage.curves import list_curves
+from tracemesh.storage.database import Database
+from tracemesh.storage.scans import load_scan
+from tracemesh.wire.live import LiveCurve, Preview
+from tracemesh.wire.resources import Curve, NodePosition, ReconstructionParameters
+
+MAX_SCANS = 8
+"""Sessions whose scan is kept in memory."""
+Loaded = tuple[Scan, list[int], list[Curve]]
+
+
+class Previewer:
+    """Keeps the scans of the sessions last asked for, and one process that solves them. On one event loop."""
+
+    def __init__(self, database: Database, flush: Callable[[], Awaitable[None]]) -> None:
+        """`flush` waits until everything accepted is committed."""
+        self._database = database
+        self._flush = flush
+        self._slot = Slot()
+        self._turn = asyncio.Lock()
+        self._scans: OrderedDict[str, asyncio.Future[Loaded]] = OrderedDict()
+        self._newest: dict[tuple[str, str], object] = {}
+
+    async def close(self) -> None:
+        """End the process."""
+        await asyncio.to_thread(self._slot.close)
+
+    def forget(self, session: str) -> None:
+        """The session's scan is not what it was."""
+        self._scans.pop(session, None)
+
+    async def solve(self, session: str, client: str, parameters: ReconstructionParameters) -> Preview:
+        """The network with these parameters.
+
+        Raises NotFound, ScanError, and Conflict when the same client asked for another one meanwhile.
+        """
+        wish = self._newest[session, client] = object()
+        try:
+            scan, indices, curves = await self._scan(session)
+            async with self._turn:
+                if self._newest[session, client] is not wish:
+                    raise Conflict("the same client asked for another preview meanwhile")
+                return _preview(await self._run(scan, indices, parameters), curves)
+        finally:
+            if self._newest.get((session, client)) is wish:
+                del self._newest[session, client]
+
+    async def _run(self, scan: Scan, indices: Sequence[int], parameters: ReconstructionParameters) -> SolvedNetwork:
+        try:
+            return await asyncio.wrap_future(self._slot.submit(solve_network, scan, indices, parameters))
+        except BrokenProcessPool:
+            self._slot.renew()
+            raise TracemeshError("the process that solves previews was lost; ask again") from None
+
+    async def _scan(self, session: str) -> Loaded:
+        if session not in self._scans:
+            self._scans[session] = asyncio.ensure_future(self._load(session))
+            while len(self._scans) > MAX_SCANS:
+                self._scans.popitem(last=False)
+        self._scans.move_to_end(session)
+        loading = self._scans[session]
+        try:
+            return await asyncio.shield(loading)
+        except TracemeshError:
+            self.forget(session)
+            raise
+
+    async def _load(self, session: str) -> Loaded:
+        await self._flush()
+
+        def read() -> Loaded:
+            with self._database.read() as transaction:
+                return *load_scan(transaction, session), list_curves(transaction, session)
+
+        return await asyncio.to_thread(read)
+
+
+def _preview(solved: SolvedNetwork, curves: Sequence[Curve]) -> Preview:
+    return Preview(
+        curves=[
+            LiveCurve(
+                index=curve.index,
+                boundary=curve.boundary,
+                closed=curve.closed,
+                ended=curve.ended,
+                positions=flat(solved.curves[curve.index].positions),
+            )
+            for curve in curves
+            if curve.index in solved.curves
+        ],
+        nodes=[NodePosition(node=number, position=_vector(p)) for number, p in sorted(solved.nodes.items())],
+        report=solved.report,
+    )
+
+
+def _vector(position: Floats) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in position)
+    return x, y, z

@@ -1,0 +1,73 @@
+"""The network while a slider moves."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tracemesh.formats.rawnet import read_rawnet
+from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.wire.live import Preview
+
+
+@pytest.fixture
+def session(server: Any, shared_data: Path) -> str:
+    """A session with the thesis author's scan."""
+    made: str = server.new_session()
+    server.http.post(f"/sessions/{made}/recordings", content=(shared_data / "lilium.rawnet").read_bytes())
+    return made
+
+
+def test_it_is_the_network_that_the_kernel_gives(server: Any, session: str, shared_data: Path) -> None:
+    answer = server.http.post(f"/sessions/{session}/preview", json={"step": "3%", "bend": 0.05})
+    preview = Preview.model_validate(answer.json())
+    scan = read_rawnet((shared_data / "lilium.rawnet").read_text())
+    network = reconstruct_network(scan, NetworkParameters(step_fraction=0.03, bend=0.05)).network
+    points = np.unique(np.concatenate([np.reshape(c.positions, (-1, 3)) for c in preview.curves]), axis=0)
+    assert points == pytest.approx(np.unique(np.round(network.points, 5), axis=0), abs=2e-5)
+    assert [c.index for c in preview.curves] == [0, 1, 2]
+    for node, point in zip(preview.nodes, network.nodes, strict=True):
+        assert node.position == pytest.approx(network.points[point], abs=1e-6)
+
+
+def test_an_edit_is_seen_at_once(server: Any, session: str) -> None:
+    before = server.http.post(f"/sessions/{session}/preview").json()
+    server.http.patch(f"/sessions/{session}/curves/2", json={"removed": True})
+    after = server.http.post(f"/sessions/{session}/preview").json()
+    assert (len(before["curves"]), len(after["curves"])) == (3, 2)
+
+
+def test_samples_that_arrive_are_seen(server: Any, ride: Any, line: Any) -> None:
+    session = server.new_session()
+    rider = ride("more", session)
+    messages = line(60)
+    for message in messages[:4]:
+        rider.send(message)
+    rider.wait_for_ack(3)
+    short = server.http.post(f"/sessions/{session}/preview", json={"step": "0.005"})
+    for message in messages[4:]:
+        rider.send(message)
+    rider.wait_for_ack(len(messages) - 1)
+    long = server.http.post(f"/sessions/{session}/preview", json={"step": "0.005"})
+    lengths = [np.ptp(r.json()["curves"][0]["positions"][::3]) for r in (short, long)]
+    assert lengths == pytest.approx([0.029, 0.059], abs=1e-4)
+
+
+def test_only_the_newest_wish_of_a_client_is_answered(server: Any, session: str) -> None:
+    """Many wishes at once: the last one is answered, and none that was overtaken costs a solution."""
+    path = f"/sessions/{session}/preview?client=slider"
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(
+            pool.map(lambda step: server.http.post(path, json={"step": f"{step}%"}).status_code, range(2, 22))
+        )
+    assert set(answers) <= {200, 409}
+    assert 200 in answers
+    assert server.http.post(path).status_code == 200
+
+
+def test_what_cannot_be_solved_says_why(server: Any) -> None:
+    answer = server.http.post(f"/sessions/{server.new_session()}/preview")
+    assert (answer.status_code, "no curve with samples" in answer.json()["detail"]) == (422, True)
+    assert server.http.post("/sessions/none/preview").status_code == 404
