@@ -331,6 +331,19 @@ export interface NodeMark {
   undo: boolean;
 }
 /**
+ * Answer to POST /sessions/{session}/preview: the network that these parameters give, without its surface.
+ */
+export interface Preview {
+  curves: LiveCurve[];
+  nodes: NodePosition[];
+  /**
+   * what was chosen and found, as in report.json
+   */
+  report: {
+    [k: string]: unknown;
+  };
+}
+/**
  * RFC 9457 problem details: the one error envelope of the API.
  */
 export interface Problem {
