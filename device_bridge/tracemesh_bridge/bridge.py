@@ -5,10 +5,10 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from tracemesh_bridge.console import Console, typed
-from tracemesh_bridge.errors import BridgeError, OperatorMistake, SpoolError
+from tracemesh_bridge.errors import OperatorMistake, SpoolError
 from tracemesh_bridge.health import Host
 from tracemesh_bridge.keys import KEYS_HELP, Command, Discard, EndCurve, KeyParser, MarkNode, Quit, StartCurve, Undo
 from tracemesh_bridge.recorder import Recorder
@@ -34,7 +34,7 @@ class Bridge:
         self._keys = KeyParser()
         self._stop = asyncio.Event()
         self._interrupted = asyncio.Event()
-        self._failure: BridgeError | None = None
+        self._failure: BaseException | None = None
         self._trouble = ""
 
     async def run(self) -> bool:
@@ -44,16 +44,27 @@ class Bridge:
         what the source cannot recover from.
         """
         self._greet()
-        uplink = asyncio.ensure_future(self._uplink.run())
-        keeper = asyncio.ensure_future(self._keep_durable())
+        background = [asyncio.ensure_future(work) for work in (self._uplink.run(), self._keep_durable())]
+        for task in background:
+            task.add_done_callback(self._ended)
         with self._signals(), typed(asyncio.get_running_loop(), self._press):
             await self._read_source()
             if not self._interrupted.is_set():
                 await self._send_rest()
-        for task in (keeper, uplink):
+        for task in background:
             task.cancel()
-        await asyncio.gather(keeper, uplink, return_exceptions=True)
+        await asyncio.gather(*background, return_exceptions=True)
         return self._close()
+
+    def _ended(self, task: asyncio.Future[Any]) -> None:
+        """What must run for ever has failed: stop, leave everything to the next start, and say why."""
+        if not task.cancelled():
+            self._failure = task.exception()
+            self._interrupt()
+
+    def _interrupt(self) -> None:
+        self._interrupted.set()
+        self._stop.set()
 
     async def _read_source(self) -> None:
         loop, stop = asyncio.get_running_loop(), threading.Event()
@@ -62,7 +73,7 @@ class Bridge:
             try:
                 for reading in self._source.readings(stop):
                     loop.call_soon_threadsafe(self._take, reading)
-            except BridgeError as error:
+            except Exception as error:  # whatever it is, the operator must hear of it
                 self._failure = error
             loop.call_soon_threadsafe(self._stop.set)
 
@@ -93,8 +104,11 @@ class Bridge:
             self._spool.delete()
         else:
             self._spool.close()
-            waiting = self._spool.next_seq - self._uplink.acknowledged
+            waiting = self._spool.written - self._uplink.acknowledged
             self._console.say(f"{waiting} messages wait in {self._spool.place}; the next start goes on there")
+        if self._spool.next_seq > self._spool.written:
+            unwritten = self._spool.next_seq - self._spool.written
+            self._console.say(f"{unwritten} messages were lost: {self._spool.trouble}")
         if self._recorder.lost:
             self._console.say(f"{self._recorder.lost} samples were lost: there was no room for them")
         if self._failure:
@@ -119,6 +133,8 @@ class Bridge:
 
     def _press(self, text: str) -> None:
         for command in self._keys.feed(text):
+            if self._stop.is_set():
+                return
             try:
                 self._console.say(self._obey(command))
             except (OperatorMistake, SpoolError) as mistake:
@@ -168,13 +184,9 @@ class Bridge:
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
-        def interrupt() -> None:
-            self._interrupted.set()
-            self._stop.set()
-
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, interrupt)
+            loop.add_signal_handler(number, self._interrupt)
         try:
             yield
         finally:

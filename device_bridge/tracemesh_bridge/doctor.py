@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from serial.tools import list_ports
-from websockets.exceptions import InvalidHandshake
+from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from tracemesh.wire.base import Vector
@@ -77,7 +77,7 @@ def check_server(address: str) -> Finding:
     try:
         with connect(url, additional_headers=headers, open_timeout=5, close_timeout=1):
             return Finding(f"server {url}")
-    except (OSError, TimeoutError, InvalidHandshake) as error:
+    except (OSError, TimeoutError, WebSocketException) as error:
         return Finding(f"no server at {url}: {failure(error)}", "start one with tracemesh serve, or give its --server")
 
 

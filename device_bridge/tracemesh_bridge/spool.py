@@ -110,8 +110,11 @@ class Spool:
         return Cursor(self._segments_from(seq), seq, lambda: self.durable)
 
     def close(self) -> None:
-        """Make everything durable and let go of the files."""
-        self.sync()
+        """Make everything durable, if the disk lets us, and let go of the files."""
+        try:
+            self.sync()
+        except OSError as error:
+            self.trouble = _trouble(error)
         for file in (self._file, self._staged):
             if file >= 0:
                 os.close(file)

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit, urlunsplit
 
 from pydantic import ValidationError
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
 from tracemesh.wire.base import PROTOCOL_VERSION
 from tracemesh.wire.device import Ack, ErrorMessage, Hello, Welcome, to_device
@@ -25,6 +25,8 @@ WINDOW = 256
 OPEN_TIMEOUT = 10.0
 STALE_AFTER = 5.0
 """s without an ack while messages are under way until the link is stale; after three times that it is reopened."""
+PING_INTERVAL, PING_TIMEOUT = 5.0, 10.0
+"""s between two questions whether the other side is there, and for which an answer is waited for."""
 FIRST_DELAY, LONGEST_DELAY = 0.25, 15.0
 _FINAL = ("version", "malformed", "forbidden")
 """Errors that the same recording will meet again: tried again only after the longest delay."""
@@ -97,9 +99,9 @@ class Uplink:
                 await self._connection()
             except Refused as error:
                 delay = LONGEST_DELAY
-                self._down(str(error))
-            except (OSError, TimeoutError, InvalidHandshake, ConnectionClosed, BridgeError) as error:
-                self._down(failure(error))
+                self._link.down(str(error))
+            except (OSError, TimeoutError, WebSocketException, BridgeError) as error:
+                self._link.down(failure(error))
             if self.acknowledged > before:
                 delay = FIRST_DELAY
             await asyncio.sleep(delay * random.uniform(0.5, 1.0))
@@ -111,17 +113,11 @@ class Uplink:
             self._progress.clear()
             await self._progress.wait()
 
-    def _down(self, why: str) -> None:
-        self._link.to(
-            LinkState.LOST if self._link.state in (LinkState.LIVE, LinkState.STALE) else self._link.state, why
-        )
-        self._link.to(LinkState.SEARCHING, why)
-
     async def _connection(self) -> None:
         self._link.to(LinkState.OPENING, self._url)
         async with connect(
-            self._url, additional_headers=self._headers, open_timeout=OPEN_TIMEOUT, ping_interval=5, ping_timeout=10,
-            compression=None, close_timeout=1,
+            self._url, additional_headers=self._headers, compression=None, close_timeout=1,
+            open_timeout=OPEN_TIMEOUT, ping_interval=PING_INTERVAL, ping_timeout=PING_TIMEOUT,
         ) as socket:  # fmt: skip
             async with asyncio.timeout(OPEN_TIMEOUT):
                 await self._greet(socket)

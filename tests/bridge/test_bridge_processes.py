@@ -1,7 +1,12 @@
 """The whole bridge against a real pseudo-terminal and a real WebSocket: whatever dies, every sample arrives once."""
 
+import os
 import resource
 import signal
+import subprocess
+import sys
+import termios
+import threading
 import time
 
 import pytest
@@ -173,3 +178,53 @@ def test_two_bridges_cannot_share_a_spool(bench):
     other = bench.bridge()
     assert other.wait() == 1
     assert "another bridge uses the spool" in other.said
+
+
+def test_a_source_that_cannot_work_ends_the_bridge_with_its_words(bench):
+    bridge = bench.recording("sensorserver", "--address", "127.0.0.1:1", "--sensors", "gyroscope")
+    assert bridge.wait() == 1
+    assert "wanted one of rotation_vector" in bridge.said
+
+
+def test_what_could_not_be_written_before_the_end_is_told(bench):
+    bench.virtual()
+    bridge = bench.bridge()
+    record_a_curve(bench, bridge, 50)
+    resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE, (3000, resource.RLIM_INFINITY))
+    bridge.says("cannot write the spool")
+    bench.samples(60)
+    assert bridge.stop(signal.SIGTERM) == 1
+    assert "messages were lost: cannot write the spool: File too large" in bridge.said
+    bridge = bench.bridge()
+    bridge.says("going on with curve 0")
+    bench.samples(20)
+    bridge.type(".q")
+    assert bridge.wait() == 0
+    assert missing(bench.server.frames(0), bench.sent()) < 100
+
+
+def test_keys_from_a_terminal_need_no_enter_and_the_terminal_is_as_before(bench, eventually):
+    bench.virtual()
+    master, slave = os.openpty()
+    before = termios.tcgetattr(slave)
+    arguments = ["--port", str(bench.folder / "rider"), "--spool", str(bench.folder / "spool")]
+    bridge = subprocess.Popen(
+        [sys.executable, "-m", "tracemesh_bridge", "morphorider", *arguments, "--server", bench.server.address],
+        stdin=slave, stderr=slave, stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    shown = bytearray()
+    reader = threading.Thread(target=lambda: [shown.extend(os.read(master, 1000)) for _ in iter(bridge.poll, 0)])
+    reader.start()
+    for key, words in ((b"", b"device: live"), (b"+", b"curve 0 (interior) started"), (b"12\r", b"node 12 at sample")):
+        os.write(master, key)
+        eventually(lambda words=words: words in shown)
+    eventually(lambda: b"Hz  jitter" in shown)
+    eventually(lambda: b"nodes 12" in shown)
+    os.write(master, b".q")
+    assert bridge.wait(30) == 0
+    os.write(slave, b"\n")
+    reader.join()
+    assert termios.tcgetattr(slave) == before
+    for end in (master, slave):
+        os.close(end)
+    assert len(bench.server.frames(0)) > 0

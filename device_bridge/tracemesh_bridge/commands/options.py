@@ -74,7 +74,9 @@ def layout(args: argparse.Namespace) -> FrameLayout:
     return read_layout(args.layout) if args.layout else FrameLayout()
 
 
-def _checked(check: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:
+def checked(check: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:
+    """A type for argparse that says what was wanted when `check` raises."""
+
     def convert(text: str) -> Any:
         try:
             return check(text)
@@ -91,9 +93,9 @@ def _number(text: str, zero: bool) -> float:
     return value
 
 
-positive = _checked(lambda text: _number(text, zero=False), "a number above 0")
-not_negative = _checked(lambda text: _number(text, zero=True), "a number from 0 up")
-identifier = _checked(TypeAdapter(Identifier).validate_python, "up to 64 letters, digits, _ and -")
-quaternion = _checked(
+positive = checked(lambda text: _number(text, zero=False), "a number above 0")
+not_negative = checked(lambda text: _number(text, zero=True), "a number from 0 up")
+identifier = checked(TypeAdapter(Identifier).validate_python, "up to 64 letters, digits, _ and -")
+quaternion = checked(
     lambda text: TypeAdapter(Quaternion).validate_python(text.split(",")), "four numbers w,x,y,z separated by commas"
 )
