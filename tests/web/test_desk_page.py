@@ -73,6 +73,9 @@ def test_a_late_joiner_sees_everything_and_looks_closer(
     assert len(set(pictures)) == len(pictures)
     expect(page.get_by_text("Mean curvature (1/m)")).to_be_visible()
 
+    page.keyboard.press("b")
+    expect(page.get_by_role("img", name="Gauss map").locator("path")).not_to_have_count(0)
+
     page.keyboard.press("m")
     box = view.bounding_box()
     assert box is not None

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { overlap, placeLabels } from "./labels";
+import { covers, overlap, placeLabels } from "./labels";
 
 const size = { width: 24, height: 18 };
 
@@ -26,11 +26,12 @@ describe("placeLabels", () => {
     const labels = placeLabels(anchors, size);
     const pairs = labels.flatMap((a, i) => labels.slice(i + 1).map((b) => [a, b] as const));
     expect(pairs.filter(([a, b]) => overlap(a, b, size))).toEqual([]);
+    expect(labels.filter((label) => anchors.some((anchor) => covers(label, anchor, size)))).toEqual([]);
     expect(labels.map((label) => label.id)).toEqual(anchors.map((anchor) => anchor.id));
   });
 
-  it("leaves earlier labels where they were when one is added", () => {
-    const anchors = [0, 1, 2].map((id) => ({ id, x: 5 * id, y: 3 * id }));
+  it("leaves earlier labels where they were when one is added out of their way", () => {
+    const anchors = [0, 1, 2].map((id) => ({ id, x: 80 * id, y: 60 * id }));
     expect(placeLabels(anchors, size).slice(0, 2)).toEqual(placeLabels(anchors.slice(0, 2), size));
   });
 });

@@ -21,22 +21,31 @@ const DIRECTIONS = 12;
 const FIRST_RING = 16;
 const RING_STEP = 12;
 const RINGS = 24;
+/** Radius of an anchor's dot, px. */
+const DOT = 4;
 
 /** Place each label beside its anchor: up and right if there is room, else around it, else further out.
  *
- * Order decides who moves: earlier anchors keep their place. Labels never overlap each other (within RINGS rings, px). */
+ * Order decides who moves: earlier anchors keep their place. Within RINGS rings, no label covers another label or
+ * another anchor's dot. */
 export function placeLabels(anchors: readonly Anchor[], size: LabelSize): Placement[] {
   const placed: Placement[] = [];
-  for (const anchor of anchors) placed.push(firstFree(anchor, placed, size));
+  for (const anchor of anchors) placed.push(firstFree(anchor, anchors, placed, size));
   return placed;
 }
 
-function firstFree(anchor: Anchor, placed: readonly Placement[], size: LabelSize): Placement {
+function firstFree(
+  anchor: Anchor,
+  anchors: readonly Anchor[],
+  placed: readonly Placement[],
+  size: LabelSize,
+): Placement {
   let candidate = at(anchor, 0, 0);
   for (let ring = 0; ring < RINGS; ring += 1) {
     for (let turn = 0; turn < DIRECTIONS; turn += 1) {
       candidate = at(anchor, ring, turn);
-      if (!placed.some((other) => overlap(candidate, other, size))) return candidate;
+      const hides = placed.some((other) => overlap(candidate, other, size));
+      if (!hides && !anchors.some((other) => covers(candidate, other, size))) return candidate;
     }
   }
   return candidate;
@@ -47,6 +56,12 @@ function at(anchor: Anchor, ring: number, turn: number): Placement {
   const angle = -Math.PI / 4 + (side * 2 * Math.PI) / DIRECTIONS;
   const radius = FIRST_RING + ring * RING_STEP;
   return { ...anchor, labelX: anchor.x + radius * Math.cos(angle), labelY: anchor.y + radius * Math.sin(angle) };
+}
+
+/** Whether a label hides the dot of an anchor. */
+export function covers(label: Placement, anchor: Anchor, size: LabelSize): boolean {
+  const [x, y] = [Math.abs(label.labelX - anchor.x), Math.abs(label.labelY - anchor.y)];
+  return x < size.width / 2 + DOT && y < size.height / 2 + DOT && anchor.id !== label.id;
 }
 
 /** Whether two labels of one size hide each other. */

@@ -1,6 +1,6 @@
 import { PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import type { Box } from "../geometry/vectors";
+import type { Box, Vector } from "../geometry/vectors";
 
 const FIELD_OF_VIEW = 32;
 const MARGIN = 1.06;
@@ -68,6 +68,13 @@ export class Rig {
   direction(): Vector3 {
     const { position, target } = this.#goal ?? { position: this.camera.position, target: this.controls.target };
     return position.clone().sub(target).normalize();
+  }
+
+  /** World axes x, y, z as the eye sees them: right, up and towards it, for each. */
+  axes(): [Vector, Vector, Vector] {
+    const turn = this.camera.quaternion.clone().invert();
+    const seen = (x: number, y: number, z: number): Vector => new Vector3(x, y, z).applyQuaternion(turn).toArray();
+    return [seen(1, 0, 0), seen(0, 1, 0), seen(0, 0, 1)];
   }
 
   /** Go on for `seconds`, or at once when they are infinite; true while there is way left. */

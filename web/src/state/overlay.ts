@@ -1,4 +1,5 @@
 import type { Placement } from "../geometry/labels";
+import type { Vector } from "../geometry/vectors";
 
 export interface Place {
   readonly x: number;
@@ -21,6 +22,19 @@ export interface OverlayContent {
   readonly marks: readonly Place[];
   readonly ruler: Ruler | undefined;
   readonly metresPerPixel: number;
+  /** World axes x, y, z as the eye sees them: right, up and towards it, for each. */
+  readonly axes: readonly [Vector, Vector, Vector];
 }
 
-export const EMPTY_OVERLAY: OverlayContent = { labels: [], tips: [], marks: [], ruler: undefined, metresPerPixel: 0 };
+export const EMPTY_OVERLAY: OverlayContent = {
+  labels: [],
+  tips: [],
+  marks: [],
+  ruler: undefined,
+  metresPerPixel: 0,
+  axes: [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ],
+};

@@ -7,6 +7,8 @@ export interface Result {
   readonly reconstruction: Reconstruction;
   readonly report: Report;
   readonly network: Network;
+  /** The curves' normals on the unit sphere, drawn as if they were points. */
+  readonly gaussMap: Network;
   readonly normals: Float32Array;
   readonly positions: Float32Array;
   readonly meshUrl: string | undefined;
@@ -40,6 +42,7 @@ export async function loadResult(api: Api, reconstruction: Reconstruction): Prom
     reconstruction,
     report,
     network: networkFromFile(file, marked),
+    gaussMap: networkFromFile({ ...file, points: file.normals }, marked),
     positions: Float32Array.from(file.points.flat()),
     normals: Float32Array.from(file.normals.flat()),
     meshUrl: artifacts["mesh.glb"],

@@ -3,6 +3,13 @@ import type { LookName } from "../scene/looks";
 
 export type Theme = "light" | "dark";
 
+/** A point of a curve: the curve's number, the point's number within it, and where it is (m). */
+export interface Pointed {
+  readonly curve: number;
+  readonly point: number;
+  readonly position: Vector;
+}
+
 /** How the person looks at the object; belongs to this browser, not to the session. */
 export class ViewStore {
   follow = $state(true);
@@ -17,8 +24,9 @@ export class ViewStore {
   /** True while two points are being picked; the points so far, m. */
   measuring = $state(false);
   measured = $state.raw<readonly Vector[]>([]);
-  /** The point (m) that the plot's cursor is at. */
-  pointed = $state.raw<Vector>();
+  gaussMap = $state(false);
+  /** The point that the plot's cursor is at. */
+  pointed = $state.raw<Pointed>();
   highlighted = $state<number>();
   help = $state(false);
   theme = $state<Theme>("light");
