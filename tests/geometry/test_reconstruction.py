@@ -310,6 +310,8 @@ def test_an_empty_scan_and_senseless_parameters_are_refused() -> None:
     for wrong in ({"step": 0.0}, {"step": np.nan}, {"step_fraction": -1.0}, {"bend": -0.1}):
         with pytest.raises(ScanError, match=next(iter(wrong))):
             reconstruct_network(exact(), NetworkParameters(**wrong))
+    with pytest.raises(ScanError, match="more than 5000000 samples"):
+        reconstruct_network(exact(), NetworkParameters(step=1e-9))
 
 
 @settings(max_examples=40, deadline=None)

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from tracemesh.errors import ScanError
+from tracemesh.errors import PiecesError
 from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.samples import Layout
 
@@ -39,7 +39,7 @@ def segment_vectors(layout: Layout, edges: Floats) -> Floats:
 
 
 def check_connected(layout: Layout, curve_indices: Ints) -> None:
-    """Raise ScanError, naming the pieces, unless all curves hang together at nodes."""
+    """Raise PiecesError, naming them, unless all curves hang together at nodes."""
     ends = layout.segment_nodes
     ones = np.ones(len(ends))
     graph = coo_array((ones, (ends[:, 0], ends[:, 1])), shape=(layout.node_count, layout.node_count))
@@ -48,7 +48,7 @@ def check_connected(layout: Layout, curve_indices: Ints) -> None:
         return
     piece = label[layout.nodes[np.searchsorted(layout.marks, layout.first[:-1])]]
     names = [", ".join(curve_name(c) for c in curve_indices[piece == p]) for p in np.unique(piece)]
-    raise ScanError(f"the network is in {count} pieces that share no node: " + "; ".join(f"({name})" for name in names))
+    raise PiecesError(f"the network is in {count} pieces that share no node: " + "; ".join(f"({name})" for name in names))
 
 
 def node_positions(layout: Layout, vectors: Floats, weights: Floats) -> Floats:

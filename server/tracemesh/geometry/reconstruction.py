@@ -33,6 +33,8 @@ Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 
 _STAGES = ("cleaning", "measuring", "resampling", "weighing", "closing", "smoothing", "positions", "uncertainty")
+_FLATTEST = 1e-3  # diagonal over length of the curves that a step is still derived from
+_MOST_SAMPLES = 5_000_000
 _OPEN_GAP = 0.2  # of its length that a closed curve may lack as measured; a half circle lacks 0.64
 
 
@@ -103,8 +105,7 @@ class NetworkReconstruction:
         self._indices = np.array([c.index for c in curves])
         self._stages.begin("measuring")
         self._measured = self._measure(curves)
-        given = self._parameters.step
-        self._step = given if given is not None else self._parameters.step_fraction * self._measured.diagonal
+        self._step = _step(self._parameters, curves, self._measured)
         self._stages.begin("resampling")
         samples = resample(curves, uniform_layout(curves, self._step), self._step)
         self._stages.begin("weighing")
@@ -219,6 +220,17 @@ def _check_parameters(parameters: NetworkParameters) -> None:
             raise ScanError(
                 f"{name} must be a {'number of at least 0' if least_is_zero else 'positive number'}, got {value}"
             )
+
+
+def _step(parameters: NetworkParameters, curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> float:
+    length = sum(curve.length for curve in curves)
+    step = parameters.step_fraction * max(measured.diagonal, _FLATTEST * length)
+    step = step if parameters.step is None else parameters.step
+    if length / step > _MOST_SAMPLES:
+        raise ScanError(
+            f"a step of {step:.3g} m would cut the curves, {length:.3g} m long, into more than {_MOST_SAMPLES} samples"
+        )
+    return step
 
 
 def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> None:
