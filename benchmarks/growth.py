@@ -9,23 +9,29 @@ from benchmarks.measuring import fitted_exponent
 from benchmarks.table import Cell, Column, Table
 from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.simulation import exact_scan
-from tracemesh.geometry.surface import span_surface
+from tracemesh.geometry.surface import SurfaceParameters, span_surface
 
 SHAPE = "leaf"
-SIZES = (1_000, 10_000, 100_000, 1_000_000)
-BUDGET = 120.0
-"""Seconds that both series together may take; a size that will not fit, judged by the ones before, is left out."""
+SIZES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000)
+BUDGET = 80.0
+"""Seconds that each series may take."""
+_LARGE = 5_000  # from here on, sizes count for the exponent
 
 Work = Callable[[int], tuple[int, float]]
 """Does the work of a wanted size; returns the size that it had and the seconds that it took."""
 
 
 def growth(data: Data, sizes: tuple[int, ...] = SIZES, budget: float = BUDGET) -> Table:
-    """Table of both series; budget: s for each of them."""
+    """Table of all series; budget: s for each of them."""
     del data  # sizes like these come from built-in shapes alone
-    rows = [*_series("network", grow_network, sizes, budget), *_series("surface", grow_surface, sizes, budget)]
+    works: dict[str, Work] = {
+        "network": grow_network,
+        "surface": grow_surface,
+        "surface, refinement off": grow_linear_surface,
+    }
+    rows = [row for name, work in works.items() for row in _series(name, work, sizes, budget)]
     columns = (
-        Column("from scan to network, from network to surface"),
+        Column("from scan to network, or from network to surface"),
         Column("samples, vertices", "d"),
         Column("time, s", ".3f"),
         Column("µs each", ".1f"),
@@ -34,7 +40,7 @@ def growth(data: Data, sizes: tuple[int, ...] = SIZES, budget: float = BUDGET) -
     )
     note = f"""Default parameters; scan of the built-in {SHAPE}, as many raw samples as network samples. Every size in a
         new process; imports are not counted, neither in time nor in memory (most that was held at once). Exponent:
-        least-squares fit over the sizes from 10000 on. A size is left out when it would take the series beyond
+        least-squares fit over the sizes above {_LARGE}. A size is left out when it would take the series beyond
         {budget:.0f} s, judged by the sizes before it."""
     return Table("growth", "Growth of time and memory with size", columns, tuple(rows), (note,))
 
@@ -49,12 +55,17 @@ def grow_network(size: int) -> tuple[int, float]:
     return len(network.points), perf_counter() - begin
 
 
-def grow_surface(size: int) -> tuple[int, float]:
+def grow_surface(size: int, parameters: SurfaceParameters = SurfaceParameters()) -> tuple[int, float]:
     """Span a surface of about so many vertices over an exact network."""
     network = built_in(SHAPE).network(_mesh_size(size))
     begin = perf_counter()
-    mesh = span_surface(network).mesh
+    mesh = span_surface(network, parameters).mesh
     return len(mesh.vertices), perf_counter() - begin
+
+
+def grow_linear_surface(size: int) -> tuple[int, float]:
+    """The same without refinement."""
+    return grow_surface(size, SurfaceParameters(refinement="off"))
 
 
 def _mesh_size(size: int) -> float:
@@ -92,7 +103,7 @@ def _row(name: str, measured: Measured[tuple[int, float]]) -> tuple[Cell, ...]:
 
 
 def _exponents(name: str, done: list[Measured[tuple[int, float]]]) -> tuple[Cell, ...]:
-    large = [m for m in done if m.result[0] > 5_000]
+    large = [m for m in done if m.result[0] > _LARGE]
     sizes = [m.result[0] for m in large]
     time = fitted_exponent(sizes, [m.result[1] for m in large])
     memory = fitted_exponent(sizes, [m.memory for m in large if m.memory]) if all(m.memory for m in large) else None

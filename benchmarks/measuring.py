@@ -13,8 +13,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def warm_seconds(work: Callable[[], object], repeats: int = 5, limit: float = 10.0) -> float:
-    """Median time of some calls, after one that does not count; no further call is begun after `limit` seconds."""
+def warm_seconds(work: Callable[[], object], repeats: int = 7, limit: float = 10.0) -> float:
+    """Shortest time of some calls, after one that does not count; no further call is begun after `limit` seconds."""
     start = perf_counter()
     work()
     times: list[float] = []
@@ -22,7 +22,7 @@ def warm_seconds(work: Callable[[], object], repeats: int = 5, limit: float = 10
         begin = perf_counter()
         work()
         times.append(perf_counter() - begin)
-    return float(np.median(times))
+    return min(times)
 
 
 def fitted_exponent(sizes: Sequence[float], values: Sequence[float]) -> float | None:

@@ -37,7 +37,7 @@ NOTES = (
 )
 
 
-def regression(data: Data, sizes: tuple[int, ...] = tuple(THESIS), repeats: int = 5) -> Table:
+def regression(data: Data, sizes: tuple[int, ...] = tuple(THESIS), repeats: int = 7) -> Table:
     """Table of one row per size; sizes: numbers of samples of Table 3.9."""
     rows = tuple(_row(data, size, repeats) for size in sizes)
     return Table("regression", "Regression on SO(3), beside a Riemannian trust region", COLUMNS, rows, NOTES)

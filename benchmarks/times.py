@@ -46,14 +46,14 @@ COLUMNS = (
 
 NOTES = (
     f"""Scans are noisy, all choices automatic; reading the file is not counted. Cold: the first call in a new process,
-    without imports. Warm: median of up to 5 calls in one process. Other weights: other smoothing lengths, the scan
+    without imports. Warm: the fastest of up to 7 calls in one process. Other weights: other smoothing lengths, the scan
     having been made ready before. Surface: meshed as finely as the network; without figure where that took more than
     {COLD_BUDGET:.0f} s. Thesis: Table 3.9 (convolution, regression and Poisson; C++ on a quad-core computer of its
     day), published, not measured here.""",
 )
 
 
-def times(data: Data, sizes: tuple[int, ...] = tuple(THESIS), repeats: int = 5) -> Table:
+def times(data: Data, sizes: tuple[int, ...] = tuple(THESIS), repeats: int = 7) -> Table:
     """Table of one row per size; sizes: numbers of samples of Table 3.9."""
     rows = tuple(_row(data, size, repeats) for size in sizes)
     return Table("times", "Times at the sizes of the thesis's Table 3.9", COLUMNS, rows, NOTES)
