@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 _MOST_MARKS = 150  # that a few variances need to be well known
 _ITERATIONS = 60
 _CHANGE = 0.01  # of every variance in an iteration, at which it ends
+_LEAST = 1e-12  # square of a deviation, relative to where the iteration starts, that stands for none
 _TRUST = 4.0  # equations' worth of trust in the expected noise
 _GREATEST_ROTATION, _GREATEST_SCALE = 0.5, 0.1  # rad and relative: standard deviations
 _FIRST_ROTATION, _FIRST_SCALE = 0.02, 0.005  # rad and relative: where the iteration starts
@@ -56,7 +57,7 @@ class _Estimation:
     def __init__(self, parts: tuple[Summary, Summary], curves: int, marks: int, shift: float) -> None:
         self._parts, self._c, self._m = parts, curves, marks
         self._rotation = np.eye(3) * _FIRST_ROTATION**2
-        self._scale, self._shift = _FIRST_SCALE**2, shift**2
+        self._scale, self._shift, self._unit = _FIRST_SCALE**2, shift**2, shift
         self._noise = [1.0, 1.0]
 
     def _prior(self) -> Floats:
@@ -92,10 +93,11 @@ class _Estimation:
         c = self._c
         second = covariance + np.outer(mean, mean)
         blocks = second[: 3 * c, : 3 * c].reshape(c, 3, c, 3)
-        square = np.diag(second)
-        self._rotation = np.einsum("cicj->ij", blocks) / c + 1e-14 * np.eye(3)
-        self._scale = float(square[3 * c : 4 * c].mean()) + 1e-16
-        self._shift = float(square[4 * c :].mean())
+        square = np.maximum(np.diag(second), 0.0)
+        rotation = np.einsum("cicj->ij", blocks) / c
+        self._rotation = (rotation + rotation.T) / 2 + max(_LEAST, _LEAST * float(np.trace(rotation))) * np.eye(3)
+        self._scale = float(square[3 * c : 4 * c].mean()) + _LEAST
+        self._shift = float(square[4 * c :].mean()) + _LEAST * self._unit**2
         self._noise = [
             _noise(p, p.total - 2 * float(p.linear @ mean) + float(np.sum(p.square * second))) for p in self._parts
         ]
@@ -103,7 +105,7 @@ class _Estimation:
 
 def _noise(part: Summary, squares: float) -> float:
     """Variance factor from a sum of squares, held to 1 by some trust in what was expected."""
-    return (_TRUST + squares) / (_TRUST + part.count)
+    return (_TRUST + max(squares, 0.0)) / (_TRUST + part.count)
 
 
 def _evidence(parts: tuple[Summary, Summary], noise: list[float], rest: float, variances: int) -> float:

@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bands = tuple[Floats, Floats]
 
+_RIDGE = 1e-6  # of the data's weight: holds rows far from any sample to the resampled frames
+
 
 @dataclass(frozen=True)
 class Offsets:
@@ -80,6 +82,7 @@ class DevelopedSpline:
         n, row, f = self._n, offsets.row, offsets.fraction
         band = np.zeros((3, n))
         band[2] = np.bincount(row, weight * (1 - f) ** 2, n) + np.bincount(row + 1, weight * f**2, n)
+        band[2] += _RIDGE * (np.bincount(self._edge, self._h, n) + np.bincount(self._edge + 1, self._h, n))
         band[1] = np.bincount(row + 1, weight * f * (1 - f), n)
         right = np.empty((n, 3))
         for axis in range(3):
