@@ -55,7 +55,7 @@ def grow_network(size: int) -> tuple[int, float]:
     return len(network.points), perf_counter() - begin
 
 
-def grow_surface(size: int, parameters: SurfaceParameters = SurfaceParameters()) -> tuple[int, float]:
+def grow_surface(size: int, parameters: SurfaceParameters | None = None) -> tuple[int, float]:
     """Span a surface of about so many vertices over an exact network."""
     network = built_in(SHAPE).network(_mesh_size(size))
     begin = perf_counter()

@@ -63,6 +63,12 @@ def nodes(data: Data, names: tuple[str, ...] = tuple(SHAPES)) -> Table:
     return Table("nodes", "Nodes without marks", columns, rows, (NOTE,))
 
 
+def without_marks(scan: Scan) -> Scan:
+    """The same curves, nothing marked on them."""
+    nothing = np.empty(0, np.int64)
+    return Scan(tuple(replace(curve, node_samples=nothing, node_ids=nothing) for curve in scan.curves))
+
+
 def meetings(nodes_of_curves: list[dict[int, float]]) -> list[Meeting]:
     """Every two curves at each node; a node: place (m) on every curve through it."""
     return [Meeting((i, j), (node[i], node[j])) for node in nodes_of_curves for i, j in combinations(sorted(node), 2)]
@@ -108,8 +114,7 @@ def _way(curve: CurveScan, a: float, b: float) -> float:
 
 
 def _inferred(known: KnownScan) -> Result:
-    nothing = np.empty(0, np.int64)
-    bare = Scan(tuple(replace(c, node_samples=nothing, node_ids=nothing) for c in known.scan.curves))
+    bare = without_marks(known.scan)
     begin = perf_counter()
     inferred = infer_nodes(bare)
     seconds = perf_counter() - begin

@@ -21,6 +21,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "positions": curves.positions,
     "bias": curves.bias,
     "uncertainty": curves.uncertainty,
+    "node_inference": curves.node_inference,
     "cell_complex": surfaces.cell_complex_picture,
     "patches": surfaces.patches,
     "surface": surfaces.surface,

@@ -1,11 +1,14 @@
 """Pictures of the way from raw samples to a curve network."""
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.accuracy import network_error
 from benchmarks.data import noisy_scan
 from benchmarks.measuring import Floats, paired_motion
+from benchmarks.nodes import marked_meetings, match_errors, proposed_meetings, without_marks
 from benchmarks.noisy import partners
 from benchmarks.pictures.canvas import BLUE, CURVES, GREEN, GREY, INK, ORANGE, draw_network, figure, plane, space
 from benchmarks.regression import regression_problem
@@ -13,6 +16,7 @@ from benchmarks.truths import CurveTruth
 from tracemesh.geometry.cleaning import clean_curves, outliers
 from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.node_inference import InferredNodes, infer_nodes, mark_nodes
 from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.regression import RegressionSolver
 from tracemesh.geometry.rotations import align_signs, darboux_frames, matrix_to_quaternion, normalized
@@ -151,6 +155,26 @@ def uncertainty() -> Figure:
     axes.plot(1e3 * result.uncertainty[order], lw=1, color=BLUE, label="u, stated")
     axes.plot(1e3 * error[order], ".", ms=3, color=ORANGE, label="error")
     axes.legend(fontsize=7, frameon=False)
+    return drawn
+
+
+def node_inference() -> Figure:
+    """The network over nodes that nobody marked, and how sure and how right each of them is."""
+    drawn = figure()
+    scan = noisy_scan("leaf").scan
+    inferred = infer_nodes(without_marks(scan))
+    network = reconstruct_network(mark_nodes(scan, inferred.proposals)).network
+    axes = space(drawn, network.points, 121, f"{len(inferred.proposals)} nodes that nobody marked")
+    draw_network(axes, network, None)
+    draw_network(axes, replace(network, segments=()))
+    right = plane(drawn, 122, "meetings of two curves", "confidence", "mm from the operator's mark")
+    true = marked_meetings(scan)
+    for proposal in inferred.proposals:
+        here = proposed_meetings(scan, InferredNodes((proposal,), ()))
+        for error in match_errors(scan, true, here):
+            right.plot(proposal.confidence, 1e3 * error, "o", ms=5, color=BLUE, alpha=0.6)
+    right.set_xlim(0, 1.02)
+    right.set_ylim(bottom=0)
     return drawn
 
 
