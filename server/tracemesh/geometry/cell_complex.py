@@ -53,12 +53,12 @@ def cell_complex(network: CurveNetwork) -> CellComplex:
     _check_segments(network)
     _check_ends(network)
     cycles = trace_cycles(network)
-    inferred = not any(segment.boundary for segment in network.segments)
-    if inferred:
-        network = _with_inferred_boundary(network, cycles)
-        inferred = any(segment.boundary for segment in network.segments)
     pieces = _pieces(network)
     paired = partners(network, cycles) if pieces.max() > 0 else {}
+    inferred = not any(segment.boundary for segment in network.segments)
+    if inferred:
+        network = _with_inferred_boundary(network, [c for k, c in enumerate(cycles) if k not in paired])
+        inferred = any(segment.boundary for segment in network.segments)
     openings = _openings(network, cycles, paired)
     faces = [number for number in range(len(cycles)) if number not in openings]
     _check_tags(network, tuple(cycles[number] for number in faces))
@@ -142,7 +142,7 @@ def _check_ends(network: CurveNetwork) -> None:
         )
 
 
-def _with_inferred_boundary(network: CurveNetwork, cycles: tuple[Cycle, ...]) -> CurveNetwork:
+def _with_inferred_boundary(network: CurveNetwork, cycles: list[Cycle]) -> CurveNetwork:
     outer = {side.segment for cycle in cycles if cycle.turning < OPENING_TURN for side in cycle.sides}
     segments = tuple(
         Segment(segment.points, index in outer, segment.curve) for index, segment in enumerate(network.segments)

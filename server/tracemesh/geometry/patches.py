@@ -7,11 +7,14 @@ import numpy as np
 from tracemesh.errors import SurfaceError
 from tracemesh.geometry.bridges import Outline, joined_outline, plain_outline
 from tracemesh.geometry.cell_complex import CellComplex, segment_name
+from tracemesh.geometry.curvature import normalised
 from tracemesh.geometry.flattening import flatten
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints
-from tracemesh.geometry.planar_maps import develop, map_to_circle, project_to_plane, signed_area
+from tracemesh.geometry.planar_maps import SMALLEST_AVERAGE, develop, map_to_circle, project_to_plane, signed_area
 from tracemesh.geometry.quality import inverted_faces, triangle_angles
 from tracemesh.geometry.triangulation import triangulate_polygon
+
+LARGEST_STRETCH = 2.0  # of a boundary in the plane; more says that the surface it was unrolled from went astray
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class PatchMesh:
     planar. vertex: (p,) the mesh vertex of a planar point; the first `fixed` of `count` vertices are the network's
     points.
     patch: (f,) number of the face's cycle. starts: (number of cycles,) first planar point of every patch.
+    lift: (count, 3) which way normals go inside patches whose boundary normals cancel out, like a hemisphere's; else 0.
     """
 
     planar: Floats
@@ -30,6 +34,7 @@ class PatchMesh:
     vertex: Ints
     patch: Ints
     starts: Ints
+    lift: Floats
     fixed: int
     count: int
 
@@ -53,7 +58,7 @@ def triangulate_patches(
     outlines = _outlines(complex_)
     count = max(count, 1 + max(int(outline.vertex.max()) for outline in outlines))
     unrolled = None if last is None else _unrolled_loops(outlines, *last)
-    planar, faces, vertex, patch, starts = [], [], [], [], []
+    planar, faces, vertex, patch, starts, lift = [], [], [], [], [], [np.zeros((count, 3))]
     begin = 0
     for number, outline in enumerate(outlines):
         loop, inside, triangles = _triangulate(
@@ -64,6 +69,7 @@ def triangulate_patches(
         vertex += [outline.vertex, count + np.arange(len(inside))]
         patch.append(np.full(len(triangles), number))
         starts.append(begin)
+        lift.append(np.tile(_lift(outline), (len(inside), 1)))
         count += len(inside)
         begin += len(loop) + len(inside)
     return PatchMesh(
@@ -72,6 +78,7 @@ def triangulate_patches(
         np.concatenate(vertex),
         np.concatenate(patch),
         np.array(starts),
+        np.vstack(lift),
         fixed,
         count,
     )
@@ -102,6 +109,18 @@ def _outlines(complex_: CellComplex) -> list[Outline]:
     return outlines
 
 
+def _perimeter(loop: Floats) -> float:
+    """m, length of a closed polygon (k, 2 or 3)."""
+    return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
+
+
+def _lift(outline: Outline) -> Floats:
+    """(3,) direction that the normals inside a patch take where those on its boundary cancel out: that of its area."""
+    if np.linalg.norm(outline.normals.mean(0)) > SMALLEST_AVERAGE:
+        return np.zeros(3)
+    return normalised(np.cross(outline.points, np.roll(outline.points, -1, axis=0)).sum(0))
+
+
 def _unrolled_loops(outlines: list[Outline], patches: PatchMesh, vertices: Floats) -> list[Floats]:
     """Boundaries of all patches, unrolled from space into the plane."""
     planar = flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)
@@ -113,12 +132,13 @@ def _triangulate(
 ) -> tuple[Floats, Floats, Ints]:
     """Loop in the plane, interior points and faces of one patch; the first map to the plane that is injective."""
     points, normals = outline.points, outline.normals
-    size = spacing or float(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).mean())
+    size = spacing or _perimeter(points) / len(points)
+    reason = "its boundary turns the wrong way"
     for loop in (unrolled, project_to_plane(points, normals), develop(points, normals), map_to_circle(points)):
         try:
-            if loop is not None and signed_area(loop) > 0:
+            if loop is not None and signed_area(loop) > 0 and _perimeter(loop) < LARGEST_STRETCH * _perimeter(points):
                 return loop, *triangulate_polygon(loop, size * coarsening)
-        except SurfaceError:
-            continue
+        except SurfaceError as error:
+            reason = str(error)
     name = segment_name(network, outline.cycle.sides[0].segment)
-    raise SurfaceError(f"the patch beside {name} cannot be triangulated")
+    raise SurfaceError(f"the patch beside {name} cannot be triangulated: {reason}")

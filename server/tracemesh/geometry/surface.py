@@ -8,14 +8,14 @@ from typing import Literal
 import numpy as np
 
 from tracemesh.errors import SurfaceError
-from tracemesh.geometry.cell_complex import CellComplex, cell_complex
+from tracemesh.geometry.cell_complex import CellComplex, cell_complex, segment_name
 from tracemesh.geometry.curvature import mean_curvature
 from tracemesh.geometry.laplacian import cotangent_laplacian, surface_laplacian
 from tracemesh.geometry.linear_surface import linear_surface, rebuilt_surface
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
 from tracemesh.geometry.patches import PatchMesh, triangulate_patches, unrolled_well
-from tracemesh.geometry.quality import mesh_quality
+from tracemesh.geometry.quality import inverted_faces, mesh_quality
 from tracemesh.geometry.refinement import refine
 from tracemesh.geometry.soft_constraints import softened_points
 from tracemesh.geometry.subdivision import subdivided
@@ -66,6 +66,7 @@ def span_surface(
     if parameters.mesh_size is not None:
         complex_ = complex_.resampled(subdivided(complex_.network, parameters.mesh_size))
     patches, vertices, normals = _linear(complex_, parameters, stages)
+    _check_spread(complex_, patches, vertices, normals)
     refinement: dict[str, object] = {"mode": parameters.refinement, "used": False}
     if parameters.refinement != "off":
         stages.begin("refinement", 0.5)
@@ -90,23 +91,34 @@ def _linear(
         patches = triangulate_patches(complex_, parameters.mesh_size, COARSE if last is None else 1.0, last)
         stages.begin("surface", 0.12 + 0.05 * attempt)
         flat = cotangent_laplacian(patches.planar[patches.planar_faces], patches.faces, patches.count)
-        vertices, spread = linear_surface(flat, patches.faces, points, normals)
+        vertices, spread = linear_surface(flat, patches.faces, points, normals, patches.lift)
         if last is not None:
             if unrolled_well(patches, vertices, spread):
                 break
-            vertices, spread = rebuilt_surface(vertices, patches.faces, points, normals)
+            vertices, spread = rebuilt_surface(vertices, patches.faces, points, normals, patches.lift)
         last = (patches, vertices)
     if parameters.soft is not None:
         points = _softened(complex_.network, patches, vertices, spread, parameters.soft)
     for step in range(REBUILDS):
         stages.begin("rebuild", 0.35 + 0.15 * step / REBUILDS)
-        rebuilt, spread = rebuilt_surface(vertices, patches.faces, points, normals)
+        rebuilt, spread = rebuilt_surface(vertices, patches.faces, points, normals, patches.lift)
         # Along the normal only: sideways nothing holds the vertices, and triangles would drift out of shape.
         vertices = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
         vertices[: len(points)] = points
-    if not np.isfinite(vertices).all():
-        raise SurfaceError("the surface is not determined by the network: positions are not finite")
     return patches, vertices, spread
+
+
+def _check_spread(complex_: CellComplex, patches: PatchMesh, vertices: Floats, normals: Floats) -> None:
+    """Raise SurfaceError for a patch most of whose triangles are turned over: its boundary says too little
+    about its inside.
+    """
+    bad = inverted_faces(vertices, patches.faces, normals) | ~np.isfinite(vertices[patches.faces]).all((1, 2))
+    share = np.bincount(patches.patch, bad) / np.bincount(patches.patch)
+    if share.max() > 0.5:
+        corner = patches.vertex[patches.starts[int(share.argmax())]]
+        number = next(k for k, s in enumerate(complex_.network.segments) if corner in s.points)
+        name = segment_name(complex_.network, number)
+        raise SurfaceError(f"the patch beside {name} folds over: add a curve across it")
 
 
 def _softened(network: CurveNetwork, patches: PatchMesh, vertices: Floats, normals: Floats, soft: float) -> Floats:

@@ -14,6 +14,7 @@ from tracemesh.geometry.network import Floats, Ints
 CLEARANCE = 0.62  # smallest distance of a lattice point to the boundary, in lattice spacings
 GROWTH = 0.5  # of the spacing per distance from the boundary, where the inside is coarser
 SHORT = 0.5  # an edge over the longer one beside it
+MOST_POINTS = 3e6  # of one patch
 RELAXATIONS = 2  # of two smoothing steps each
 
 
@@ -25,8 +26,13 @@ def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
     the loop, triangles grow away from them.
     Returns interior points (m, 2) and faces (f, 3), counter-clockwise, indices into loop then interior points.
     No edge inside joins two corners of the loop, except across an acute corner. Raises SurfaceError if the polygon
-    crosses itself.
+    crosses itself or the spacing is too small for it.
     """
+    expected = float(np.prod(np.ptp(loop, axis=0)) / spacing**2)
+    if not expected < MOST_POINTS:
+        raise SurfaceError(
+            f"a mesh size of {spacing:.3g} m asks for some {expected:.1g} vertices in one patch: wanted a larger one"
+        )
     fixed = np.vstack([loop, _points_beside_short_edges(loop)])
     inside = _graded_lattice(loop, fixed, spacing)
     faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))

@@ -1,0 +1,130 @@
+"""Laws of the Laplacian, the curvature, the unrolling and the edge tables on meshes with exact answers."""
+
+import numpy as np
+import pytest
+import robust_laplacian
+
+from tracemesh.geometry.curvature import mean_curvature
+from tracemesh.geometry.edges import boundary_vertices, interior_edges, unique_edges
+from tracemesh.geometry.flattening import flatten
+from tracemesh.geometry.laplacian import cotangent_laplacian, surface_laplacian, triangle_areas
+from tracemesh.geometry.network import Floats, Ints
+from tracemesh.geometry.quality import mesh_quality
+from tracemesh.geometry.triangulation import triangulate_polygon
+
+
+def icosphere(steps: int) -> tuple[Floats, Ints]:
+    """Unit sphere: an octahedron, subdivided."""
+    vertices = np.vstack([np.eye(3), -np.eye(3)])
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+    for _ in range(steps):
+        edges, number = np.unique(
+            np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1),
+            axis=0,
+            return_inverse=True,
+        )
+        middle = len(vertices) + number.reshape(-1, 3)
+        middles = vertices[edges].sum(1)
+        vertices = np.vstack([vertices, middles / np.linalg.norm(middles, axis=1, keepdims=True)])
+        corner = [np.column_stack([faces[:, k], middle[:, k], middle[:, k - 1]]) for k in range(3)]
+        faces = np.vstack([*corner, middle])
+    return vertices, faces
+
+
+def disk() -> tuple[Floats, Ints]:
+    turn = 2 * np.pi * np.arange(40) / 40
+    loop = np.column_stack([np.cos(turn), np.sin(turn)])
+    inside, faces = triangulate_polygon(loop, 0.16)
+    return np.vstack([loop, inside]), faces
+
+
+def slow_stiffness(vertices: Floats, faces: Ints) -> Floats:
+    """The cotangent formula, corner by corner."""
+    total = np.zeros((len(vertices), len(vertices)))
+    for face in faces:
+        for k in range(3):
+            tip, i, j = face[k], face[(k + 1) % 3], face[(k + 2) % 3]
+            a, b = vertices[i] - vertices[tip], vertices[j] - vertices[tip]
+            weight = 0.5 * (a @ b) / np.linalg.norm(np.cross(a, b))
+            for row, column, sign in ((i, j, 1), (j, i, 1), (i, i, -1), (j, j, -1)):
+                total[row, column] += sign * weight
+    return total
+
+
+def test_stiffness_equals_the_slow_formula() -> None:
+    vertices, faces = icosphere(2)
+    stiffness = cotangent_laplacian(vertices[faces], faces, len(vertices)).stiffness
+    np.testing.assert_allclose(stiffness.toarray(), slow_stiffness(vertices, faces), atol=1e-12)
+
+
+def test_linear_functions_are_harmonic_and_mass_is_the_area() -> None:
+    points, faces = disk()
+    laplacian = cotangent_laplacian(points[faces], faces, len(points))
+    residual = laplacian.stiffness @ (points @ [2.0, -3.0] + 1)
+    np.testing.assert_allclose(residual[~boundary_vertices(faces, len(points))], 0, atol=1e-12)
+    assert laplacian.mass.sum() == pytest.approx(triangle_areas(points[faces]).sum())
+
+
+def test_laplacian_of_a_delaunay_mesh_is_the_intrinsic_one() -> None:
+    vertices, faces = icosphere(3)
+    ours, (theirs, _) = surface_laplacian(vertices, faces), robust_laplacian.mesh_laplacian(vertices, faces)
+    assert abs(ours.stiffness + theirs).max() < 1e-3
+
+
+def test_laplacian_of_any_mesh_has_no_negative_weights() -> None:
+    vertices, faces = icosphere(3)
+    squeezed = vertices * [1.0, 1.0, 0.05]
+    off_diagonal = surface_laplacian(squeezed, faces).stiffness.toarray() * (1 - np.eye(len(vertices)))
+    plain = cotangent_laplacian(squeezed[faces], faces, len(vertices)).stiffness.toarray() * (1 - np.eye(len(vertices)))
+    assert plain.min() < -0.1
+    assert off_diagonal.min() > -1e-6
+
+
+@pytest.mark.parametrize("radius", [0.5, 3.0])
+def test_mean_curvature_of_spheres(radius: float) -> None:
+    vertices, faces = icosphere(4)
+    curvature = mean_curvature(radius * vertices, faces, vertices)
+    np.testing.assert_allclose(curvature, 1 / radius, rtol=2e-3)
+
+
+def test_mean_curvature_keeps_its_sign() -> None:
+    """Seen from inside a sphere is a hollow; a saddle has none."""
+    vertices, faces = icosphere(4)
+    np.testing.assert_allclose(mean_curvature(vertices, faces[:, ::-1], -vertices), -1, rtol=2e-3)
+    points, flat_faces = disk()
+    x, y = 0.3 * points.T
+    saddle = np.column_stack([x, y, x * y])
+    normals = np.column_stack([-y, -x, np.ones_like(x)]) / np.sqrt(1 + x**2 + y**2)[:, None]
+    inside = ~boundary_vertices(flat_faces, len(points))
+    assert abs(mean_curvature(saddle, flat_faces, normals)[inside]).max() < 0.05
+
+
+def test_unrolling_a_cylinder_is_isometric() -> None:
+    points, faces = disk()
+    rolled = np.column_stack([np.sin(points[:, 0]), np.cos(points[:, 0]), points[:, 1]])
+    start = np.column_stack([np.sin(points[:, 0]), points[:, 1]])
+    flat = flatten(rolled, faces, start, np.array([0]))
+    edges = unique_edges(faces)[0]
+    lengths = [np.linalg.norm(p[edges[:, 1]] - p[edges[:, 0]], axis=1) for p in (flat, rolled)]
+    np.testing.assert_allclose(*lengths, rtol=5e-3)
+
+
+def test_edge_tables_agree_with_counting() -> None:
+    for vertices, faces in (icosphere(2), disk()):
+        count = unique_edges(faces)[1]
+        inner = interior_edges(faces)
+        assert len(inner.start) == (count == 2).sum()
+        rows = [set(map(int, faces[f])) for f in inner.left], [set(map(int, faces[f])) for f in inner.right]
+        for k in range(len(inner.start)):
+            pair = {int(inner.start[k]), int(inner.end[k])}
+            assert rows[0][k] == pair | {int(inner.left_tip[k])}
+            assert rows[1][k] == pair | {int(inner.right_tip[k])}
+        assert boundary_vertices(faces, len(vertices)).sum() == (count == 1).sum()
+
+
+def test_quality_of_an_octahedron() -> None:
+    vertices, faces = icosphere(0)
+    quality = mesh_quality(vertices, faces, vertices)
+    assert (quality.euler_number, quality.boundary_loops, quality.inverted_faces) == (2, 0, 0)
+    assert quality.min_angle == pytest.approx(60)
+    assert mesh_quality(vertices, faces[1:], vertices).boundary_loops == 1
