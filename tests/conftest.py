@@ -6,6 +6,7 @@ import socket
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from uuid import uuid4
 
@@ -23,9 +24,17 @@ def shared_data() -> Path:
     return folder
 
 
+@dataclass(frozen=True)
+class PostgreSql:
+    """A real PostgreSQL: its URL, less a database's name, and what restarts it as after a crash."""
+
+    url: str
+    crash: Callable[[], None]
+
+
 @pytest.fixture(scope="session")
-def postgresql() -> Iterator[str]:
-    """URL, less the database's name, of a real PostgreSQL that lives as long as the tests."""
+def postgresql() -> Iterator[PostgreSql]:
+    """A real PostgreSQL that lives as long as the tests."""
     programs = [Path(found).parent for found in [shutil.which("initdb")] if found]
     programs += sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
     assert programs, "wanted PostgreSQL (Debian: apt-get install postgresql), found no initdb"
@@ -44,8 +53,11 @@ def postgresql() -> Iterator[str]:
 
     run("initdb", "-U", "tracemesh", "-A", "trust", "--no-sync", "-E", "UTF8")
     options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories= -c fsync=off"
-    run("pg_ctl", "-w", "-o", options, "-l", str(folder / "log"), "start")
-    yield f"postgresql+pg8000://tracemesh@127.0.0.1:{port}"
+    start = ("-w", "-o", options, "-l", str(folder / "log"))
+    run("pg_ctl", *start, "start")
+    yield PostgreSql(
+        f"postgresql+pg8000://tracemesh@127.0.0.1:{port}", lambda: run("pg_ctl", *start, "-m", "immediate", "restart")
+    )
     run("pg_ctl", "-w", "-m", "immediate", "stop")
     shutil.rmtree(folder)
 
@@ -57,7 +69,7 @@ def new_database(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     def make(kind: str) -> str:
         if kind == "sqlite":
             return f"sqlite:///{tmp_path_factory.mktemp('sqlite') / 'test.db'}"
-        server, name = request.getfixturevalue("postgresql"), f"test_{uuid4().hex}"
+        server, name = request.getfixturevalue("postgresql").url, f"test_{uuid4().hex}"
         engine = create_engine(f"{server}/postgres", isolation_level="AUTOCOMMIT")
         with engine.connect() as connection:
             connection.exec_driver_sql(f"CREATE DATABASE {name}")

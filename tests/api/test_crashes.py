@@ -146,6 +146,31 @@ def test_a_full_disk_is_told_and_nothing_acknowledged_is_lost(server_process: An
     assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
 
 
+def test_postgresql_crashes_under_a_device(start_server: Any, new_database: Any, postgresql: Any, line: Any) -> None:
+    """The device is told or cut off, connects again as a bridge does, and everything is there once and in order."""
+    server = start_server(database_url=new_database("postgresql"))
+    session = server.new_session()
+    messages = [json.dumps(m) for m in line(3000, block=10)]
+    hello = json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "test"}})
+    acknowledged, crashes = -1, 0
+    while acknowledged < len(messages) - 1:
+        with server.connect("/ingest") as socket:
+            socket.send(hello)
+            answer = json.loads(socket.recv(timeout=20))
+            for text in messages[answer.get("next_seq", len(messages)) :]:
+                try:
+                    socket.send(text)
+                    answer = json.loads(socket.recv(timeout=20))
+                except ConnectionClosed:
+                    break
+                acknowledged = answer.get("seq", acknowledged)
+                if acknowledged > 100 and crashes < 2:
+                    postgresql.crash()
+                    crashes += 1
+    assert crashes == 2
+    assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
+
+
 def _small_files() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
 

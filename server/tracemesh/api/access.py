@@ -14,8 +14,8 @@ from tracemesh.api.errors import problem
 from tracemesh.settings import LOOPBACK, Settings
 
 COOKIE = "tracemesh"
-OPEN_PATHS = frozenset({"/healthz"})
-"""What answers without a token; it tells nothing."""
+OPEN_PATHS = frozenset({"/healthz", "/readyz"})
+"""What answers without a token; they tell nothing."""
 SIGN_IN = """<!doctype html><html lang="en"><meta charset="utf-8"><title>tracemesh</title>
 <body style="font: 16px system-ui; max-width: 30em; margin: 4em auto"><h1>tracemesh</h1>
 <form action="/"><label>Token <input name="token" type="password" autofocus required></label> <button>Enter</button>

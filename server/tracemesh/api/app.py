@@ -9,10 +9,13 @@ from typing import Any
 
 from fastapi import APIRouter, FastAPI
 from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
 
 from tracemesh.api.access import Access
+from tracemesh.api.compression import WeakTags
 from tracemesh.api.errors import install_handlers
 from tracemesh.api.live.hub import Hub
+from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
 from tracemesh.api.routes import curves, ingest, live, pages, reconstructions, recordings, sessions
@@ -46,7 +49,11 @@ def create_app(settings: Settings) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         swagger_ui_oauth2_redirect_url=None,
-        middleware=[Middleware(Access, settings=settings)],
+        middleware=[
+            Middleware(Access, settings=settings),
+            Middleware(WeakTags),
+            Middleware(GZipMiddleware, compresslevel=4),
+        ],
     )
     install_handlers(app)
     api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
@@ -72,13 +79,16 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     def tell(reconstruction: Reconstruction) -> None:
         loop.call_soon_threadsafe(hub.progressed, reconstruction)
 
-    recorder = Recorder(database, settings.max_session_bytes, observe)
+    metrics = Metrics()
+    recorder = Recorder(database, settings.max_session_bytes, observe, metrics)
     hub = Hub(database, settings.resolved_database_url, recorder.flush)
+    metrics.watch("devices", "Devices connected", lambda: recorder.open_count)
+    metrics.watch("watchers", "Browsers that watch a session", lambda: hub.watcher_count)
     previewer = Previewer(database, recorder.flush)
     runner = JobRunner(settings, database, tell)
     store = ArtifactStore(settings.artifact_dir)
     try:
-        yield Services(settings, database, store, recorder, hub, previewer, runner, loop)
+        yield Services(settings, database, store, recorder, hub, previewer, metrics, runner, loop)
     finally:
         await asyncio.to_thread(runner.close)
         await hub.close()

@@ -7,6 +7,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from pydantic import ValidationError
+from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
 from tracemesh.errors import Conflict, NotFound, TracemeshError
@@ -22,6 +23,7 @@ def install_handlers(app: FastAPI) -> None:
     app.add_exception_handler(TracemeshError, _on_own_error)
     app.add_exception_handler(HTTPException, _on_http_error)
     app.add_exception_handler(RequestValidationError, _on_invalid_request)
+    app.add_exception_handler(OperationalError, _on_storage_error)
     app.add_exception_handler(Exception, _on_bug)
 
 
@@ -54,6 +56,11 @@ async def _on_http_error(request: Request, error: Exception) -> Response:
 async def _on_invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     return problem(422, "the request does not fit", request.url.path, validation_problems(error))
+
+
+async def _on_storage_error(request: Request, error: Exception) -> Response:
+    log.error("the database failed: %s", error)
+    return problem(503, "the database does not answer, or cannot write", request.url.path)
 
 
 async def _on_bug(request: Request, error: Exception) -> Response:

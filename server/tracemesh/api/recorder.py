@@ -10,6 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
+from sqlalchemy.exc import SQLAlchemyError
+
+from tracemesh.api.metrics import Metrics
 from tracemesh.errors import Refused
 from tracemesh.storage.database import Database
 from tracemesh.storage.ingest import Group, commit, open_recording
@@ -19,6 +22,7 @@ from tracemesh.wire.device import Hello, Recorded
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
+OUT_OF_ORDER = Refused("storage", "the server cannot store messages now; keep them and connect again")
 
 
 class Sender(Protocol):
@@ -41,12 +45,17 @@ class Recorder:
     """Every write of recordings goes through here; to be used on one event loop."""
 
     def __init__(
-        self, database: Database, max_session_bytes: int, observer: Callable[[RecordingState, Recorded], None]
+        self,
+        database: Database,
+        max_session_bytes: int,
+        observer: Callable[[RecordingState, Recorded], None],
+        metrics: Metrics,
     ) -> None:
         """`observer` sees every message once, as soon as it is accepted; it must not wait."""
         self._database = database
         self._max_session_bytes = max_session_bytes
         self._observer = observer
+        self._metrics = metrics
         self._open: dict[int, tuple[RecordingState, Sender]] = {}
         self._deleting: set[str] = set()
         self._batch = _Batch()
@@ -71,7 +80,11 @@ class Recorder:
     async def open(self, hello: Hello, payload: bytes, sender: Sender) -> RecordingState:
         """Begin or go on with a recording; another sender of the same one is cut off. Raises Refused."""
         async with self._lock:
-            state = await self._write(open_recording, hello, payload)
+            try:
+                state = await self._write(open_recording, hello, payload)
+            except SQLAlchemyError:
+                log.exception("could not open recording %s", hello.recording)
+                raise OUT_OF_ORDER from None
             if state.session.id in self._deleting:
                 raise Refused("unknown", f"there is no session {state.session.id}")
             if state.key in self._open:
@@ -101,6 +114,7 @@ class Recorder:
             self._check_size(state, len(payload))
             state.advance(message, len(payload))
             self._batch.group.add(state, message, payload)
+            self._metrics.bytes.inc(len(payload))
             self._observer(state, message)
         self._wake.set()
 
@@ -151,11 +165,13 @@ class Recorder:
 
     async def _commit(self, group: Group) -> None:
         try:
-            await self._write(commit, group)
+            with self._metrics.commits.time():
+                await self._write(commit, group)
         except Exception:
             log.exception("could not commit %d messages", len(group.messages))
             self._fail_all()
             return
+        self._metrics.messages.inc(len(group.messages))
         for key, row in group.reached.items():
             if key in self._open:
                 state, sender = self._open[key]
@@ -164,9 +180,8 @@ class Recorder:
 
     def _fail_all(self) -> None:
         """What is in memory runs ahead of what could be stored: everybody has to go back to what is durable."""
-        reason = Refused("storage", "the server cannot store messages now; keep them and connect again")
         for _, sender in self._open.values():
-            sender.fail(reason)
+            sender.fail(OUT_OF_ORDER)
         self._open.clear()
         self._batch.done.set()
         self._batch = _Batch()

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import Depends
+from fastapi import Depends, Header
 from sqlalchemy.orm import Session as Transaction
 from starlette.requests import HTTPConnection
 
 from tracemesh.api.live.hub import Hub
+from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
 from tracemesh.jobs.runner import JobRunner
@@ -28,6 +29,7 @@ class Services:
     recorder: Recorder
     hub: Hub
     previewer: Previewer
+    metrics: Metrics
     runner: JobRunner
     loop: asyncio.AbstractEventLoop
 
@@ -59,5 +61,9 @@ def writing(services: UseServices) -> Iterator[Transaction]:
         yield transaction
 
 
+IdempotencyKey = Annotated[
+    str | None,
+    Header(min_length=1, max_length=200, description="the same key again gives what the first request made"),
+]
 Reading = Annotated[Transaction, Depends(reading)]
 Writing = Annotated[Transaction, Depends(writing, scope="function")]

@@ -7,7 +7,6 @@ from tracemesh.errors import InputError, NotFound, Refused
 from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import read_recording, recording_from_scan, write_recording
 from tracemesh.formats.scans import is_recording
-from tracemesh.storage.models import new_id
 from tracemesh.storage.states import RecordingState, SessionState
 from tracemesh.wire.device import Hello, Recorded
 
@@ -24,14 +23,14 @@ class Upload:
     messages: list[tuple[Recorded, bytes]]
 
 
-def parse_upload(content: bytes, session: str) -> Upload:
-    """A rawnet or a recording, to be stored in `session`; raises InputError with the line."""
+def parse_upload(content: bytes, session: str, name: str) -> Upload:
+    """A rawnet, to be recorded under `name`, or a recording, which has one; raises InputError with the line."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"wanted UTF-8 text, got byte 0x{content[error.start]:02x} at {error.start}") from None
     if not is_recording(text):
-        text = write_recording(recording_from_scan(read_rawnet(text), f"file-{new_id()}", session))
+        text = write_recording(recording_from_scan(read_rawnet(text), name, session))
     lines = [line for line in text.split("\n") if line.strip()]
     recording = read_recording(lines)
     hello = recording.hello.model_copy(update={"session": session})

@@ -2,6 +2,7 @@
 
 import secrets
 from datetime import UTC, datetime
+from hashlib import sha256
 from typing import Any
 
 from sqlalchemy import JSON, BigInteger, DateTime, Dialect, ForeignKey, Integer, LargeBinary, String, UniqueConstraint
@@ -31,6 +32,11 @@ def now() -> datetime:
 def new_id() -> str:
     """An identifier that nobody has chosen yet; 64 random bits."""
     return secrets.token_hex(8)
+
+
+def derived_id(key: str, *scope: str) -> str:
+    """The identifier of what a request with this idempotency key makes: the same again for the same request."""
+    return sha256("\n".join([*scope, key]).encode()).hexdigest()[:32]
 
 
 class Base(DeclarativeBase):

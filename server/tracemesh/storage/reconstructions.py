@@ -16,11 +16,19 @@ UNFINISHED: tuple[JobState, ...] = ("queued", "running")
 
 
 def create_reconstruction(
-    transaction: Transaction, session: str, parameters: ReconstructionParameters
+    transaction: Transaction, session: str, parameters: ReconstructionParameters, identifier: str | None = None
 ) -> Reconstruction:
-    """A queued reconstruction of a session; raises NotFound."""
+    """A queued reconstruction of a session, or the one that has this identifier already.
+
+    Raises NotFound, and Conflict when that one has other parameters.
+    """
     session_row(transaction, session)
-    row = ReconstructionRow(id=new_id(), session_id=session, parameters=parameters.model_dump())
+    known = transaction.get(ReconstructionRow, identifier) if identifier else None
+    if known is not None:
+        if known.parameters != parameters.model_dump():
+            raise Conflict("the same Idempotency-Key came with other parameters before")
+        return describe(transaction, known)
+    row = ReconstructionRow(id=identifier or new_id(), session_id=session, parameters=parameters.model_dump())
     transaction.add(row)
     transaction.flush()
     return describe(transaction, row)

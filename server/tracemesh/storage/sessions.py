@@ -8,9 +8,14 @@ from tracemesh.storage.models import CurveRow, MarkRow, ReconstructionRow, Sessi
 from tracemesh.wire.resources import Session, SessionCreate, SessionUpdate
 
 
-def create_session(transaction: Transaction, wanted: SessionCreate) -> Session:
-    """A new session; raises Conflict when its identifier is taken."""
-    identifier = wanted.id or new_id()
+def create_session(transaction: Transaction, wanted: SessionCreate, derived: str | None = None) -> Session:
+    """A new session, or the one that has the identifier `derived` from an idempotency key already.
+
+    Raises Conflict when the identifier that the caller wants is taken.
+    """
+    identifier = wanted.id or derived or new_id()
+    if wanted.id is None and derived is not None and (known := transaction.get(SessionRow, derived)) is not None:
+        return _session(transaction, known)
     if transaction.get(SessionRow, identifier) is not None:
         raise Conflict(f"there is a session {identifier} already")
     row = SessionRow(id=identifier, name=wanted.name)

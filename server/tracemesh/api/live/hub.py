@@ -34,6 +34,11 @@ class Hub:
         self._slot = Slot()
         self._one_at_a_time = asyncio.Lock()
 
+    @property
+    def watcher_count(self) -> int:
+        """Browsers that watch."""
+        return sum(len(room.clients) for room in self._rooms.values())
+
     async def close(self) -> None:
         """Send everybody away."""
         for room in self._rooms.values():

@@ -74,6 +74,7 @@ class _Connection:
 
     async def refuse(self, reason: Refused) -> None:
         """Say why, and close."""
+        self._services.metrics.refusals.labels(reason.code).inc()
         log.warning("a device was refused: %s: %s", reason.code, reason)
         message = ErrorMessage(code=reason.code, message=str(reason), expected_seq=reason.expected_seq)
         try:

@@ -5,7 +5,11 @@ from pathlib import Path
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, PlainTextResponse
+from prometheus_client import CONTENT_TYPE_LATEST
+from sqlalchemy import select
 from starlette.staticfiles import StaticFiles
+
+from tracemesh.api.services import Reading, UseServices
 
 WEB = Path(__file__).resolve().parents[2] / "web"
 """Where `make setup` builds the web app."""
@@ -20,6 +24,19 @@ router = APIRouter(include_in_schema=False)
 def healthz() -> PlainTextResponse:
     """The process answers."""
     return PlainTextResponse("ok\n")
+
+
+@router.get("/readyz")
+def readyz(transaction: Reading) -> PlainTextResponse:
+    """The database answers too."""
+    transaction.execute(select(1))
+    return PlainTextResponse("ok\n")
+
+
+@router.get("/metrics")
+def metrics(services: UseServices) -> PlainTextResponse:
+    """For Prometheus."""
+    return PlainTextResponse(services.metrics.text(), media_type=CONTENT_TYPE_LATEST)
 
 
 @router.get("/docs")

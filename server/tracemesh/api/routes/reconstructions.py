@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import FileResponse
 
-from tracemesh.api.services import Reading, UseServices
+from tracemesh.api.services import IdempotencyKey, Reading, UseServices
 from tracemesh.storage import reconstructions
 from tracemesh.storage.artifacts import MEDIA_TYPES, artifact_row
+from tracemesh.storage.models import derived_id
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.live import Preview
 from tracemesh.wire.resources import Reconstruction, ReconstructionParameters
@@ -21,10 +22,13 @@ def create(
     services: UseServices,
     response: Response,
     parameters: ReconstructionParameters | None = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> Reconstruction:
     """Queue a reconstruction; follow it with GET or on the session's live socket."""
     with services.database.write() as transaction:
-        made = reconstructions.create_reconstruction(transaction, session, parameters or ReconstructionParameters())
+        derived = idempotency_key and derived_id(idempotency_key, session)
+        wanted = parameters or ReconstructionParameters()
+        made = reconstructions.create_reconstruction(transaction, session, wanted, derived)
     services.runner.submit(made.id)
     services.loop.call_soon_threadsafe(services.hub.progressed, made)
     response.headers["Location"] = f"/api/v1/reconstructions/{made.id}"

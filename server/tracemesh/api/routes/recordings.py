@@ -6,10 +6,11 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from tracemesh.api.services import Reading, Services, UseServices
+from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
 from tracemesh.api.upload import parse_upload, store_upload
 from tracemesh.errors import InputError
 from tracemesh.storage import recordings
+from tracemesh.storage.models import derived_id, new_id
 from tracemesh.storage.recordings import recording_messages, recording_row
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.resources import RecordingSummary
@@ -33,10 +34,17 @@ def export(session: Identifier, recording: Identifier, services: UseServices) ->
 
 
 @router.post("", status_code=201)
-async def upload(session: Identifier, request: Request, services: UseServices, response: Response) -> RecordingSummary:
+async def upload(
+    session: Identifier,
+    request: Request,
+    services: UseServices,
+    response: Response,
+    idempotency_key: IdempotencyKey = None,
+) -> RecordingSummary:
     """Take in a rawnet or a recording, told apart by their first character; a recording sent before is completed."""
     content = await _body(request, services.settings.max_upload_bytes)
-    parsed = await run_in_threadpool(parse_upload, content, session)
+    name = f"file-{derived_id(idempotency_key, session) if idempotency_key else new_id()}"
+    parsed = await run_in_threadpool(parse_upload, content, session, name)
     await store_upload(services.recorder, parsed)
     services.edited(session)
     response.headers["Location"] = f"/api/v1/sessions/{session}/recordings/{parsed.hello.recording}"

@@ -4,8 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from tracemesh.api.services import Reading, UseServices, Writing
+from tracemesh.api.services import IdempotencyKey, Reading, UseServices, Writing
 from tracemesh.storage import sessions
+from tracemesh.storage.models import derived_id
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.resources import Session, SessionCreate, SessionUpdate
 
@@ -13,9 +14,11 @@ router = APIRouter(prefix="/sessions", tags=["sessions"])
 
 
 @router.post("", status_code=201)
-def create(wanted: SessionCreate, transaction: Writing, response: Response) -> Session:
+def create(
+    wanted: SessionCreate, transaction: Writing, response: Response, idempotency_key: IdempotencyKey = None
+) -> Session:
     """Begin a session; 409 when the identifier is taken."""
-    made = sessions.create_session(transaction, wanted)
+    made = sessions.create_session(transaction, wanted, idempotency_key and derived_id(idempotency_key, "session"))
     response.headers["Location"] = f"/api/v1/sessions/{made.id}"
     return made
 
