@@ -21,6 +21,7 @@ from tracemesh.terminal import ProgressLine
 from tracemesh.wire.resources import ReconstructionParameters
 
 if TYPE_CHECKING:
+    from tracemesh.geometry.node_inference import InferredNodes
     from tracemesh.pipeline import Reconstruction
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -77,6 +78,7 @@ def _add_reconstruct(commands: Commands) -> None:
     parser.add_argument(
         "--curve-bias", choices=("auto", "on", "off"), default="auto", help="fit heading and scale per curve (auto)"
     )
+    parser.add_argument("--infer-nodes", action="store_true", help="find the nodes that are not marked")
     parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
     parser.add_argument("--no-surface", action="store_true", help="stop after the network; MESH is then not written")
     parser.set_defaults(command=_reconstruct)
@@ -186,14 +188,30 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
         bend=chosen.bend,
         weights=chosen.weights,
         curve_bias=chosen.curve_bias,
+        infer_nodes=chosen.infer_nodes,
         soft=chosen.soft,
         surface=not chosen.no_surface,
     )
     scan = read_scan(read_text(chosen.input), chosen.input)
     with ProgressLine() as progress:
         result = reconstruct(scan, parameters, progress)
+    if result.nodes:
+        print(f"tracemesh: {_nodes_in_words(result.nodes)}", file=sys.stderr)
     _write_results(chosen, result)
     return 0
+
+
+def _nodes_in_words(nodes: InferredNodes) -> str:
+    from tracemesh.pipeline import LEAST_CONFIDENCE, is_used
+
+    used = [p for p in nodes.proposals if is_used(p)]
+    marked = sum(p.node is not None for p in used)
+    unlikely = len(nodes.proposals) - len(used)
+    least = min((p.confidence for p in used), default=0.0)
+    return (
+        f"{len(used)} nodes, {marked} of them marked, {len(used) - marked} found with a confidence of at least "
+        f"{least:.2f}; {unlikely} left out, being no likelier than {LEAST_CONFIDENCE}"
+    )
 
 
 def _surface(chosen: argparse.Namespace) -> int:
@@ -221,15 +239,15 @@ def _write_results(chosen: argparse.Namespace, result: Reconstruction) -> None:
 def _evaluate(chosen: argparse.Namespace) -> int:
     from tracemesh.formats.meshes import read_mesh
     from tracemesh.formats.networks import read_network
-    from tracemesh.geometry.evaluation import evaluate
+    from tracemesh.geometry.evaluation import evaluate, vertex_normals
 
     truth = read_mesh(read_bytes(chosen.truth), Path(chosen.truth).suffix.lstrip("."), chosen.truth)
     if Path(chosen.input).suffix == ".json":
         network = read_network(read_text(chosen.input), chosen.input)
         measured = evaluate(network.points, network.normals, *truth, align=chosen.align)
     else:
-        vertices, _ = read_mesh(read_bytes(chosen.input), Path(chosen.input).suffix.lstrip("."), chosen.input)
-        measured = evaluate(vertices, None, *truth, align=chosen.align)
+        vertices, faces = read_mesh(read_bytes(chosen.input), Path(chosen.input).suffix.lstrip("."), chosen.input)
+        measured = evaluate(vertices, vertex_normals(vertices, faces), *truth, align=chosen.align)
     print(json.dumps(measured.summary()) if chosen.json else measured.text())
     return 0
 

@@ -3,6 +3,7 @@
 TracemeshError
 ├── InputError            a file or message that cannot be read: says where, what was wanted, what came
 ├── ScanError             readable, but no network can be reconstructed from it: names the curve
+│   ├── PiecesError       its curves do not hang together at nodes: names the pieces
 │   └── NetworkError      the curves do not form the cell complex that a surface needs: names the segment
 ├── SurfaceError          no valid mesh can be spanned over a network
 ├── Cancelled             somebody asked for the work to stop
@@ -23,6 +24,10 @@ class InputError(TracemeshError):
 
 class ScanError(TracemeshError):
     """A scan from which no network can be reconstructed; the message names the curve and the reason."""
+
+
+class PiecesError(ScanError):
+    """A scan whose curves do not hang together at nodes; the message names the pieces."""
 
 
 class NetworkError(ScanError):

@@ -2,15 +2,18 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from time import perf_counter
 
+from tracemesh.errors import PiecesError, ScanError
 from tracemesh.formats.meshes import write_mesh
 from tracemesh.formats.networks import write_network
+from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
+from tracemesh.geometry.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
 from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.surface import SurfaceParameters, span_surface
 from tracemesh.wire.resources import ReconstructionParameters
@@ -20,15 +23,22 @@ Progress = Callable[[str, float], None]
 
 NETWORK_SHARE = 0.3
 """Part of the whole work, as the progress bar shows it, that the network takes."""
+LEAST_CONFIDENCE = 0.5
+"""A node that was found rather than marked is used where it is likelier than not."""
+SOFT_LENGTH = 2.0
+"""Edge lengths over which a soft surface smooths its network."""
 
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """What a reconstruction leaves: `mesh` is None when only the network was asked for; `report` is plain JSON."""
+    """What a reconstruction leaves: `mesh` is None when only the network was asked for; `report` is plain JSON; `nodes`
+    are those that were found, None when they were not asked for.
+    """
 
     network: CurveNetwork
     mesh: Mesh | None
     report: dict[str, object]
+    nodes: InferredNodes | None = None
 
     def mesh_file(self, extension: str = "glb") -> bytes:
         """The mesh as a file of this extension; GLB also holds the network and where it all comes from."""
@@ -56,13 +66,59 @@ def reconstruct(
     parameters = parameters or ReconstructionParameters()
     report = progress or _silent
     begin = perf_counter()
-    curves = reconstruct_network(scan, network_parameters(parameters), _part(report, 0.0, NETWORK_SHARE))
-    result = Reconstruction(curves.network, None, {"generator": _generator(), "network": curves.report})
+    found = _find_nodes(scan, report) if parameters.infer_nodes else None
+    curves = _network(_marked(scan, found), parameters, _part(report, 0.0, NETWORK_SHARE))
+    nodes = {"nodes": _nodes_report(found)} if found else {}
+    result = Reconstruction(curves.network, None, {"generator": _generator(), **nodes, "network": curves.report}, found)
     if parameters.surface:
-        result = _with_surface(result, SurfaceParameters(), _part(report, NETWORK_SHARE, 1.0))
+        soft = SOFT_LENGTH if parameters.soft else None
+        result = _with_surface(result, SurfaceParameters(soft=soft), _part(report, NETWORK_SHARE, 1.0))
     result.report["seconds"] = perf_counter() - begin
     report("done", 1.0)
     return result
+
+
+def is_used(proposal: NodeProposal) -> bool:
+    """Whether a node that was found is likely enough to be part of the network."""
+    return proposal.confidence > LEAST_CONFIDENCE
+
+
+def _find_nodes(scan: Scan, progress: Progress) -> InferredNodes:
+    progress("nodes", 0.0)
+    found = infer_nodes(scan)
+    if found.unplaced:
+        names = ", ".join(curve_name(i) for i in found.unplaced)
+        raise ScanError(f"no place was found for {names}: mark where they meet the other curves, or leave them out")
+    return found
+
+
+def _marked(scan: Scan, found: InferredNodes | None) -> Scan:
+    return mark_nodes(scan, [p for p in found.proposals if is_used(p)]) if found else scan
+
+
+def _nodes_report(found: InferredNodes) -> dict[str, object]:
+    """Curves and samples are counted from 0, as in the network's file."""
+    proposals = [
+        {
+            "places": [{"curve": curve, "sample": sample} for curve, sample in p.places],
+            "confidence": p.confidence,
+            "marked": p.node is not None,
+            "used": is_used(p),
+        }
+        for p in found.proposals
+    ]
+    return {"least_confidence": LEAST_CONFIDENCE, "proposals": proposals}
+
+
+def _network(scan: Scan, parameters: ReconstructionParameters, progress: Progress) -> NetworkResult:
+    try:
+        return reconstruct_network(scan, network_parameters(parameters), progress)
+    except PiecesError as error:
+        if parameters.infer_nodes:
+            hint = f"even with the nodes that were found with a confidence over {LEAST_CONFIDENCE}: mark more of them"
+        else:
+            hint = "mark where they meet, or have the nodes found (--infer-nodes)"
+        raise PiecesError(f"{error}; {hint}") from None
 
 
 def span(network: CurveNetwork, progress: Progress | None = None) -> Reconstruction:
@@ -91,7 +147,7 @@ def network_parameters(parameters: ReconstructionParameters) -> NetworkParameter
 
 def _with_surface(before: Reconstruction, parameters: SurfaceParameters, progress: Progress) -> Reconstruction:
     spanned = span_surface(before.network, parameters, progress)
-    return Reconstruction(before.network, spanned.mesh, {**before.report, "surface": spanned.report})
+    return replace(before, mesh=spanned.mesh, report={**before.report, "surface": spanned.report})
 
 
 def _generator() -> str:

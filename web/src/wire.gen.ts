@@ -296,6 +296,10 @@ export interface ReconstructionParameters {
   bend: number | null;
   curve_bias: "auto" | "on" | "off";
   /**
+   * find the nodes that are not marked; those marked already are kept
+   */
+  infer_nodes: boolean;
+  /**
    * let the surface leave a noisy network a little
    */
   soft: boolean;

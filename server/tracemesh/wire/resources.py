@@ -86,6 +86,9 @@ class ReconstructionParameters(Message):
     bend: float | None = Field(default=None, ge=0, description="smoothing length of the bend term, m")
     weights: Literal["auto", "thesis"] = "auto"
     curve_bias: Literal["auto", "on", "off"] = "auto"
+    infer_nodes: bool = Field(
+        default=False, description="find the nodes that are not marked; those marked already are kept"
+    )
     soft: bool = Field(default=False, description="let the surface leave a noisy network a little")
     surface: bool = Field(default=True, description="also span the surface, not only the network")
 
