@@ -87,6 +87,7 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     previewer = Previewer(database, recorder.flush)
     runner = JobRunner(settings, database, tell)
     store = ArtifactStore(settings.artifact_dir)
+    await asyncio.to_thread(_collect_garbage, database, store)
     try:
         yield Services(settings, database, store, recorder, hub, previewer, metrics, runner, loop)
     finally:
@@ -95,3 +96,10 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
         await previewer.close()
         await recorder.close()
         database.close()
+
+
+def _collect_garbage(database: Database, store: ArtifactStore) -> None:
+    with database.read() as transaction:
+        removed = store.remove_unreferenced(transaction)
+    if removed:
+        log.info("removed %d artifacts that no reconstruction has any more", removed)

@@ -22,7 +22,10 @@ from tracemesh.wire.device import Hello, Recorded
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
-OUT_OF_ORDER = Refused("storage", "the server cannot store messages now; keep them and connect again")
+
+
+def _out_of_order() -> Refused:
+    return Refused("storage", "the server cannot store messages now; keep them and connect again")
 
 
 class Sender(Protocol):
@@ -84,7 +87,7 @@ class Recorder:
                 state = await self._write(open_recording, hello, payload)
             except SQLAlchemyError:
                 log.exception("could not open recording %s", hello.recording)
-                raise OUT_OF_ORDER from None
+                raise _out_of_order() from None
             if state.session.id in self._deleting:
                 raise Refused("unknown", f"there is no session {state.session.id}")
             if state.key in self._open:
@@ -181,7 +184,7 @@ class Recorder:
     def _fail_all(self) -> None:
         """What is in memory runs ahead of what could be stored: everybody has to go back to what is durable."""
         for _, sender in self._open.values():
-            sender.fail(OUT_OF_ORDER)
+            sender.fail(_out_of_order())
         self._open.clear()
         self._batch.done.set()
         self._batch = _Batch()

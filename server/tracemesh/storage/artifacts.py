@@ -2,9 +2,11 @@
 
 import os
 import tempfile
+import time
 from hashlib import sha256
 from pathlib import Path
 
+from sqlalchemy import select
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import NotFound
@@ -26,7 +28,9 @@ class ArtifactStore:
         """Store durably, or keep what is there already; the digest."""
         digest = sha256(content).hexdigest()
         target = self.path(digest)
-        if not target.exists():
+        if target.exists():
+            target.touch()
+        else:
             target.parent.mkdir(exist_ok=True)
             self._write(target, content)
         return digest
@@ -34,6 +38,19 @@ class ArtifactStore:
     def path(self, digest: str) -> Path:
         """Where a content is."""
         return self._folder / digest[:2] / digest
+
+    def remove_unreferenced(self, transaction: Transaction, min_age: float = 3600.0) -> int:
+        """Delete contents that no reconstruction has, and pieces of interrupted writes; how many.
+
+        Files younger than `min_age` (s) stay: a running job stores its contents before it names them.
+        """
+        known = set(transaction.scalars(select(ArtifactRow.sha256)))
+        latest = time.time() - min_age
+        files = [file for file in self._folder.rglob("*") if file.is_file() and file.name not in known]
+        old = [file for file in files if file.stat().st_mtime <= latest]
+        for file in old:
+            file.unlink(missing_ok=True)
+        return len(old)
 
     def _write(self, target: Path, content: bytes) -> None:
         """Whole or not at all, also when the machine stops."""
