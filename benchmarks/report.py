@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TypedDict
+from typing import Any, TypedDict
 
 from benchmarks.table import Table
 
@@ -10,8 +10,7 @@ from benchmarks.table import Table
 class Record(TypedDict):
     """One table as it was measured: when, of which commit, in how many seconds."""
 
-    table: dict[str, object]
-    markdown: str
+    table: dict[str, Any]
     measured: str
     revision: str
     seconds: float
@@ -31,9 +30,7 @@ are named as such.
 
 
 def record(table: Table, measured: str, revision: str, seconds: float) -> Record:
-    return Record(
-        table=table.document(), markdown=table.markdown(), measured=measured, revision=revision, seconds=seconds
-    )
+    return Record(table=table.document(), measured=measured, revision=revision, seconds=seconds)
 
 
 def read_report(path: Path, machine: dict[str, object]) -> Report:
@@ -64,4 +61,4 @@ def _machine(machine: dict[str, object]) -> str:
 
 def _section(entry: Record) -> str:
     foot = f"Measured {entry['measured']}, commit {entry['revision']}, in {entry['seconds']:.0f} s."
-    return f"{entry['markdown']}\n{foot}\n"
+    return f"{Table.read(entry['table']).markdown()}\n{foot}\n"

@@ -1,6 +1,7 @@
 """A table of measured figures: the one type that every benchmark returns, as Markdown and as JSON."""
 
 from dataclasses import dataclass
+from typing import Any
 
 Cell = str | int | float | None
 
@@ -40,7 +41,14 @@ class Table:
         notes = [f"\n{_joined(note)}" for note in self.notes]
         return "\n".join([f"## {self.title}\n", head, rule, *body, *notes]) + "\n"
 
-    def document(self) -> dict[str, object]:
+    @classmethod
+    def read(cls, document: dict[str, Any]) -> "Table":
+        """The table that `document` describes."""
+        columns = tuple(Column(**column) for column in document["columns"])
+        rows = tuple(tuple(row) for row in document["rows"])
+        return cls(document["name"], document["title"], columns, rows, tuple(document["notes"]))
+
+    def document(self) -> dict[str, Any]:
         """The same as plain JSON, numbers unrounded."""
         return {
             "name": self.name,

@@ -1,14 +1,12 @@
 """Pictures of the way from raw samples to a curve network."""
 
-from dataclasses import replace
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.accuracy import network_error
 from benchmarks.data import noisy_scan
 from benchmarks.measuring import Floats, paired_motion
-from benchmarks.nodes import marked_meetings, match_errors, proposed_meetings, without_marks
+from benchmarks.nodes import TOLERANCE, marked_meetings, match_errors, proposed_meetings, without_marks
 from benchmarks.noisy import partners
 from benchmarks.pictures.canvas import BLUE, CURVES, GREEN, GREY, INK, ORANGE, draw_network, figure, plane, space
 from benchmarks.regression import regression_problem
@@ -20,7 +18,7 @@ from tracemesh.geometry.node_inference import InferredNodes, infer_nodes, mark_n
 from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.regression import RegressionSolver
 from tracemesh.geometry.rotations import align_signs, darboux_frames, matrix_to_quaternion, normalized
-from tracemesh.geometry.scan import CurveScan
+from tracemesh.geometry.scan import CurveScan, Scan
 from tracemesh.geometry.shapes import leaf
 from tracemesh.geometry.simulation import plan_scan, simulate_scan
 
@@ -159,22 +157,23 @@ def uncertainty() -> Figure:
 
 
 def node_inference() -> Figure:
-    """The network over nodes that nobody marked, and how sure and how right each of them is."""
+    """The network over nodes that nobody marked, and how sure and how right such nodes are."""
     drawn = figure()
     scan = noisy_scan("leaf").scan
     inferred = infer_nodes(without_marks(scan))
     network = reconstruct_network(mark_nodes(scan, inferred.proposals)).network
     axes = space(drawn, network.points, 121, f"{len(inferred.proposals)} nodes that nobody marked")
     draw_network(axes, network, None)
-    draw_network(axes, replace(network, segments=()))
-    right = plane(drawn, 122, "meetings of two curves", "confidence", "mm from the operator's mark")
-    true = marked_meetings(scan)
-    for proposal in inferred.proposals:
-        here = proposed_meetings(scan, InferredNodes((proposal,), ()))
-        for error in match_errors(scan, true, here):
-            right.plot(proposal.confidence, 1e3 * error, "o", ms=5, color=BLUE, alpha=0.6)
+    axes.scatter(*network.points[network.nodes].T, s=14, color=INK, depthshade=False, zorder=3)
+    right = plane(
+        drawn, 122, "proposed meetings; above the line there is none", "confidence", "mm from the operator's mark"
+    )
+    for name, colour in zip(("leaf", "sphere", "torus", "cone", "egg"), CURVES, strict=False):
+        sure = _sureness(noisy_scan(name).scan)
+        right.plot(*sure.T, "o", ms=5, color=colour, alpha=0.6, label=name)
+    right.axhline(1e3 * TOLERANCE, lw=0.6, ls=":", color=INK)
     right.set_xlim(0, 1.02)
-    right.set_ylim(bottom=0)
+    right.legend(fontsize=7, frameon=False)
     return drawn
 
 
@@ -191,6 +190,16 @@ def simulation() -> Figure:
             curve.time[curve.node_samples], curve.readings.acceleration[curve.node_samples, 2], "o", ms=4, color=INK
         )
     return drawn
+
+
+def _sureness(scan: Scan) -> Floats:
+    """Confidence and error (k, 2), the latter in mm, of every proposed meeting; those that are none end at the top."""
+    rows, true, most = [], marked_meetings(scan), 1.5 * TOLERANCE
+    for proposal in infer_nodes(without_marks(scan)).proposals:
+        for meeting in proposed_meetings(scan, InferredNodes((proposal,), ())):
+            errors = match_errors(scan, true, [meeting])
+            rows.append((proposal.confidence, 1e3 * (errors[0] if errors else most)))
+    return np.array(rows)
 
 
 def _frames(curve: CurveScan) -> Floats:

@@ -71,7 +71,7 @@ def surface() -> Figure:
 
 def curvature() -> Figure:
     """Mean curvature, which changes its sign."""
-    drawn = figure()
+    drawn = figure(5.0)
     network = built_in("leaf").network(STEP / 2)
     mesh = span_surface(network).mesh
     axes = space(drawn, mesh.vertices, 111, "mean curvature of the leaf", (50, -70))
@@ -90,7 +90,7 @@ def refinement() -> Figure:
 
 def evaluation() -> Figure:
     """Distance of a surface to the known one."""
-    drawn = figure()
+    drawn = figure(5.0)
     network, truth = built_in("torus").network(STEP), MeshTruth(*built_in("torus").mesh(128))
     mesh = span_surface(network).mesh
     axes = space(drawn, mesh.vertices, 111, "a surface over exact curves, and how far it is from the truth", (20, 20))

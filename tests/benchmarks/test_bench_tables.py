@@ -36,6 +36,7 @@ def test_table_renders_aligned_with_absent_figures_and_joined_notes() -> None:
         "one two",
     ]
     assert table.document()["rows"] == [["x", 1.234], ["yy", None]]
+    assert Table.read(json.loads(json.dumps(table.document()))).markdown() == table.markdown()
 
 
 def test_row_of_another_length_is_refused() -> None:
