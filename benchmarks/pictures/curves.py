@@ -8,7 +8,7 @@ from benchmarks.data import noisy_scan
 from benchmarks.measuring import Floats, paired_motion
 from benchmarks.nodes import TOLERANCE, marked_meetings, match_errors, proposed_meetings, without_marks
 from benchmarks.noisy import partners
-from benchmarks.pictures.canvas import BLUE, CURVES, GREEN, GREY, INK, ORANGE, draw_network, figure, plane, space
+from benchmarks.pictures.canvas import BLUE, CURVES, GREEN, GREY, INK, ORANGE, Axes, draw_network, figure, plane, space
 from benchmarks.regression import regression_problem
 from benchmarks.truths import CurveTruth
 from tracemesh.geometry.cleaning import clean_curves, outliers
@@ -137,7 +137,15 @@ def positions() -> Figure:
 
 def bias() -> Figure:
     """Error along all curves without and with a heading and a scale per curve."""
-    return _errors_along((("without", "off", ORANGE), ("with heading and scale per curve", "on", BLUE)))
+    drawn = figure()
+    known = noisy_scan("leaf")
+    axes = plane(drawn, 111, "distance to the true place of every point", "points along all curves", "mm")
+    plain, corrected = NetworkParameters(curve_bias="off"), NetworkParameters(curve_bias="on")
+    for label, chosen, colour in (("without", plain, ORANGE), ("with heading and scale per curve", corrected, BLUE)):
+        network = reconstruct_network(known.scan, chosen).network
+        axes.plot(1e3 * _true_errors(network, known.truth)[_along(network)], lw=1.2, color=colour, label=label)
+    axes.legend(fontsize=7, frameon=False)
+    return drawn
 
 
 def uncertainty() -> Figure:
@@ -206,9 +214,9 @@ def _frames(curve: CurveScan) -> Floats:
     return darboux_frames(normalized(curve.tangent), curve.normal)
 
 
-def _mark_nodes(axes: object, places: Floats) -> None:
+def _mark_nodes(axes: Axes, places: Floats) -> None:
     for place in places:
-        axes.axvline(place, lw=0.6, ls=":", color=INK)  # type: ignore[attr-defined]
+        axes.axvline(place, lw=0.6, ls=":", color=INK)
 
 
 def _integrated(network: CurveNetwork, tangents: Floats) -> list[Floats]:
@@ -232,14 +240,3 @@ def _along(network: CurveNetwork) -> Floats:
 def _true_errors(network: CurveNetwork, truth: CurveNetwork) -> Floats:
     there = partners(network, truth)
     return np.asarray(np.linalg.norm(paired_motion(network.points, there).apply(network.points) - there, axis=1))
-
-
-def _errors_along(modes: tuple[tuple[str, str, str], ...]) -> Figure:
-    drawn = figure()
-    known = noisy_scan("leaf")
-    axes = plane(drawn, 111, "distance to the true place of every point", "points along all curves", "mm")
-    for label, mode, colour in modes:
-        network = reconstruct_network(known.scan, NetworkParameters(curve_bias=mode)).network  # type: ignore[arg-type]
-        axes.plot(1e3 * _true_errors(network, known.truth)[_along(network)], lw=1.2, color=colour, label=label)
-    axes.legend(fontsize=7, frameon=False)
-    return drawn
