@@ -10,7 +10,7 @@ export default defineConfig({
     outDir: fileURLToPath(new URL("../server/tracemesh/web", import.meta.url)),
     emptyOutDir: true,
     target: "es2022",
-    rolldownOptions: { input: ["index.html", "phone.html"].map((name) => fileURLToPath(new URL(name, import.meta.url))) },
+    rolldownOptions: { input: ["index.html", "scan.html"].map((name) => fileURLToPath(new URL(name, import.meta.url))) },
     chunkSizeWarningLimit: 900,
   },
   server: { proxy: { "/api": { target: server, ws: true } } },

@@ -39,8 +39,8 @@ def test_pages_are_accessible(server: Server, page: Page, rider: Callable[[str],
     expect(page.get_by_role("dialog")).to_be_visible()
     assert _faults(page) == []
 
-    page.goto(server.page(f"phone.html#{session}"))
-    expect(page.get_by_role("button", name="Use the sensors")).to_be_visible()
+    page.goto(server.page(f"scan.html#{session}"))
+    expect(page.get_by_role("button", name="Use this device's sensors")).to_be_visible()
     assert _faults(page) == []
 
 

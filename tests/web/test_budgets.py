@@ -9,7 +9,7 @@ import pytest
 BUILT = Path(__file__).resolve().parents[2] / "server/tracemesh/web"
 
 
-@pytest.mark.parametrize(("page", "budget"), [("phone.html", 150_000), ("index.html", 150_000)])
+@pytest.mark.parametrize(("page", "budget"), [("scan.html", 150_000), ("index.html", 150_000)])
 def test_first_load(page: str, budget: int) -> None:
     assert sum(map(_compressed, _closure(BUILT / page))) <= budget
 

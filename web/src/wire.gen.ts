@@ -335,6 +335,37 @@ export interface NodeMark {
   undo: boolean;
 }
 /**
+ * Where a node is on one of its curves.
+ */
+export interface NodePlace {
+  /**
+   * index within the session
+   */
+  curve: number;
+  sample: number;
+}
+/**
+ * A node that was found, or one marked already; accepted by marking its places with PATCH on their curves.
+ */
+export interface NodeProposal {
+  confidence: number;
+  /**
+   * its number, if it is marked already
+   */
+  node: number | null;
+  places: NodePlace[];
+}
+/**
+ * GET /sessions/{session}/node-proposals.
+ */
+export interface NodeProposals {
+  proposals: NodeProposal[];
+  /**
+   * curves of which nothing is known: no place was found for them
+   */
+  unplaced: number[];
+}
+/**
  * Answer to POST /sessions/{session}/preview: the network that these parameters give, without its surface.
  */
 export interface Preview {

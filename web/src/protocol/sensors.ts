@@ -1,20 +1,15 @@
-import { fromDeviceAngles, isRotation, type Quaternion } from "../geometry/orientation";
+import { continued, fromDeviceAngles, isRotation, type Quaternion } from "../geometry/orientation";
+import { REFERENCE, type SourceHandlers, type Source, type StopSource } from "./source";
 
-export interface Reading {
-  /** s, the device's own clock. */
+interface Orientation {
   readonly time: number;
-  /** Device to world (ENU). */
-  readonly orientation: Quaternion;
+  readonly quaternion: Quaternion;
 }
 
-export interface SensorHandlers {
-  reading(reading: Reading): void;
-  /** Why there are no readings, in words. */
+interface OrientationHandlers {
+  reading(orientation: Orientation): void;
   failed(words: string): void;
 }
-
-/** Reads the orientation until it is called. */
-export type StopSensor = () => void;
 
 interface OrientationSensor extends EventTarget {
   readonly quaternion: readonly [number, number, number, number] | null;
@@ -34,8 +29,18 @@ const RATE = 60;
 const PATIENCE = 2500;
 const REFUSED = "This page may not read the motion sensors. Allow them for this site in the browser's settings.";
 
+/** The orientation sensor of the device that shows this page: top edge forward, screen away from the surface. */
+export const motionSensors: Source = {
+  kind: "phone",
+  label: "Use this device's sensors",
+  hint: "Lay the phone on the surface, screen outwards, and lead it along the curve with its top edge first.",
+  device: { kind: "phone", name: "phone", wheel: null, mounting: [0.5, 0.5, 0.5, 0.5], reference: REFERENCE },
+  missing,
+  start: startSensor,
+};
+
 /** What the browser lacks before it can be asked for its sensors; empty when nothing. */
-export function missing(window: Window): string {
+function missing(window: Window): string {
   if (!window.isSecureContext) return "Browsers give their sensors only to pages that come over HTTPS.";
   if (!("AbsoluteOrientationSensor" in window) && !("DeviceOrientationEvent" in window)) {
     return "This browser has no orientation sensor.";
@@ -44,12 +49,7 @@ export function missing(window: Window): string {
 }
 
 /** Begin to read the orientation; must be called from a tap, because iOS asks the person. */
-export async function startSensor(window: Window, handlers: SensorHandlers): Promise<StopSensor> {
-  const failed = missing(window);
-  if (failed) {
-    handlers.failed(failed);
-    return () => undefined;
-  }
+async function startSensor(window: Window, handlers: SourceHandlers): Promise<StopSource> {
   const watched = watchSilence(handlers);
   const Sensor = (window as { AbsoluteOrientationSensor?: OrientationSensorClass }).AbsoluteOrientationSensor;
   const stop = Sensor ? startAbsolute(Sensor, watched.handlers) : await startEvents(window, watched.handlers);
@@ -59,12 +59,12 @@ export async function startSensor(window: Window, handlers: SensorHandlers): Pro
   };
 }
 
-function startAbsolute(Sensor: OrientationSensorClass, handlers: SensorHandlers): StopSensor {
+function startAbsolute(Sensor: OrientationSensorClass, handlers: OrientationHandlers): StopSource {
   const sensor = new Sensor({ frequency: RATE, referenceFrame: "device" });
   sensor.addEventListener("reading", () => {
     if (!sensor.quaternion || sensor.timestamp === null) return;
     const [x, y, z, w] = sensor.quaternion;
-    if (isRotation([w, x, y, z])) handlers.reading({ time: sensor.timestamp / 1000, orientation: [w, x, y, z] });
+    if (isRotation([w, x, y, z])) handlers.reading({ time: sensor.timestamp / 1000, quaternion: [w, x, y, z] });
   });
   sensor.addEventListener("error", (event) => {
     const name = (event as Event & { error?: DOMException }).error?.name;
@@ -74,7 +74,7 @@ function startAbsolute(Sensor: OrientationSensorClass, handlers: SensorHandlers)
   return () => sensor.stop();
 }
 
-async function startEvents(window: Window, handlers: SensorHandlers): Promise<StopSensor> {
+async function startEvents(window: Window, handlers: OrientationHandlers): Promise<StopSource> {
   const ask = (window as unknown as { DeviceOrientationEvent: AppleOrientation }).DeviceOrientationEvent;
   if (ask.requestPermission && (await ask.requestPermission()) !== "granted") {
     handlers.failed(REFUSED);
@@ -82,8 +82,8 @@ async function startEvents(window: Window, handlers: SensorHandlers): Promise<St
   }
   const name = "ondeviceorientationabsolute" in window ? "deviceorientationabsolute" : "deviceorientation";
   const listener = (event: Event): void => {
-    const orientation = fromEvent(event as DeviceOrientationEvent);
-    if (orientation) handlers.reading({ time: event.timeStamp / 1000, orientation });
+    const quaternion = fromEvent(event as DeviceOrientationEvent);
+    if (quaternion) handlers.reading({ time: event.timeStamp / 1000, quaternion });
   };
   window.addEventListener(name, listener);
   return () => window.removeEventListener(name, listener);
@@ -96,13 +96,15 @@ function fromEvent(event: DeviceOrientationEvent & { webkitCompassHeading?: numb
   return alpha === null || beta === null || gamma === null ? undefined : fromDeviceAngles(alpha, beta, gamma);
 }
 
-/** Tell when nothing comes at all. */
-function watchSilence(handlers: SensorHandlers): { handlers: SensorHandlers; stop: StopSensor } {
+/** Tell when nothing comes at all; leave no jumps of sign. */
+function watchSilence(handlers: SourceHandlers): { handlers: OrientationHandlers; stop: StopSource } {
   const timer = setTimeout(() => handlers.failed("No orientation comes from this device's sensors."), PATIENCE);
   const stop = (): void => clearTimeout(timer);
-  const reading = (value: Reading): void => {
+  let before: Quaternion | undefined;
+  const reading = ({ time, quaternion }: Orientation): void => {
     stop();
-    handlers.reading(value);
+    before = continued(quaternion, before);
+    handlers.reading({ time, quaternion: before });
   };
   const failed = (words: string): void => {
     stop();

@@ -1,17 +1,17 @@
 import { type DBSchema, type IDBPDatabase, openDB } from "idb";
-import type { CurveEnd, CurveStart, NodeMark, Samples } from "../wire.gen";
+import type { CurveEnd, CurveStart, Device, NodeMark, Samples } from "../wire.gen";
 
 type Columns = Pick<Samples, "type" | "seq" | "curve" | "first_sample"> & {
-  readonly time: number[];
-  readonly quaternion: [number, number, number, number][];
+  readonly [name in "time" | "quaternion" | "ticks" | "acceleration" | "magnetic"]?: NonNullable<Samples[name]>;
 };
 
-/** What a phone sends about a scan. */
+/** What a page sends about a scan. */
 export type Recorded = CurveStart | CurveEnd | NodeMark | Columns;
 
 /** Where a recording stands; kept with its messages, so that a reload goes on where the page was left. */
 export interface RecordingState {
   readonly recording: string;
+  readonly device: Device;
   readonly nextSeq: number;
   readonly nextCurve: number;
   /** Number of the curve being scanned, if there is one, and of its samples so far. */

@@ -1,6 +1,6 @@
-import { continued, type Quaternion } from "../geometry/orientation";
-import type { Reading } from "../protocol/sensors";
+import type { Reading } from "../protocol/source";
 import type { Recorded, RecordingState, Spool } from "../protocol/spool";
+import type { Device } from "../wire.gen";
 
 /** Samples in one message. */
 const BLOCK = 15;
@@ -8,7 +8,6 @@ const BLOCK = 15;
 /** Turns readings and taps into the numbered messages of one recording, in the order in which they happened. */
 export class Recorder {
   #pending: Reading[] = [];
-  #before: Quaternion | undefined;
   #writing: Promise<void> = Promise.resolve();
 
   /** `stored` is called whenever the spool has something new. */
@@ -18,9 +17,8 @@ export class Recorder {
     private readonly stored: () => void,
   ) {}
 
-  /** Go on with the recording in a spool, or begin one; a curve that a reload interrupted is ended. */
-  static async resume(spool: Spool, fresh: () => string, stored: () => void): Promise<Recorder> {
-    const state = (await spool.state()) ?? empty(fresh());
+  /** Go on with a recording; a curve that a reload interrupted is ended. */
+  static async resume(spool: Spool, state: RecordingState, stored: () => void): Promise<Recorder> {
     const recorder = new Recorder(spool, state, stored);
     if (state.openCurve !== null) await recorder.end(false);
     return recorder;
@@ -37,7 +35,6 @@ export class Recorder {
 
   start(boundary: boolean): Promise<void> {
     const curve = this.current.nextCurve;
-    this.#before = undefined;
     return this.#keep({ type: "curve.start", seq: this.current.nextSeq, curve, boundary }, {
       nextCurve: curve + 1,
       openCurve: curve,
@@ -48,9 +45,7 @@ export class Recorder {
   /** One reading; kept in blocks. */
   async add(reading: Reading): Promise<void> {
     if (this.current.openCurve === null) return;
-    const orientation = continued(reading.orientation, this.#before);
-    this.#before = orientation;
-    this.#pending.push({ time: reading.time, orientation });
+    this.#pending.push(reading);
     if (this.#pending.length >= BLOCK) await this.flush();
   }
 
@@ -78,8 +73,7 @@ export class Recorder {
     const { openCurve: curve, samples, nextSeq: seq } = this.current;
     if (curve === null || block.length === 0) return this.#writing;
     this.#pending = [];
-    const columns = { time: block.map((r) => r.time), quaternion: block.map((r) => r.orientation) };
-    const message = { type: "samples", seq, curve, first_sample: samples, ...columns } as const;
+    const message = { type: "samples", seq, curve, first_sample: samples, ...columnsOf(block) } as const;
     await this.#keep(message, { samples: samples + block.length });
   }
 
@@ -94,6 +88,13 @@ export class Recorder {
   }
 }
 
-function empty(recording: string): RecordingState {
-  return { recording, nextSeq: 0, nextCurve: 0, openCurve: null, samples: 0 };
+/** A recording with nothing in it. */
+export function freshRecording(recording: string, device: Device): RecordingState {
+  return { recording, device, nextSeq: 0, nextCurve: 0, openCurve: null, samples: 0 };
+}
+
+/** Readings side by side: one column for each thing that was measured. */
+function columnsOf(block: readonly Reading[]): Record<string, unknown[]> {
+  const names = Object.keys(block[0] ?? {}) as (keyof Reading)[];
+  return Object.fromEntries(names.map((name) => [name, block.map((reading) => reading[name])]));
 }

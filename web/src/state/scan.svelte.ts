@@ -1,15 +1,13 @@
 import type { Api } from "../protocol/api";
 import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
-import { type Reading, startSensor, type StopSensor } from "../protocol/sensors";
-import { DurableSpool } from "../protocol/spool";
+import type { Reading, Source, StopSource } from "../protocol/source";
+import { DurableSpool, type RecordingState } from "../protocol/spool";
 import { Uplink } from "../protocol/uplink";
 import type { Hello } from "../wire.gen";
 import { mergedNumbers, Network } from "./network";
-import { Recorder } from "./recorder";
+import { freshRecording, Recorder } from "./recorder";
 import { inWords } from "./session.svelte";
 
-/** Top of the phone forward, screen away from the surface: turns (t, N, B) into the phone's y, z, x. */
-const MOUNTING: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
 const READINGS_INTERVAL = 500;
 const BUZZ = 40;
 
@@ -18,13 +16,15 @@ interface Mark {
   readonly sample: number;
 }
 
-/** A phone that is a scanning device: its sensors, its recording and the way to the server. */
-export class PhoneStore {
+/** A page that is a scanning device: its source of readings, its recording and the way to the server. */
+export class ScanStore {
   readonly network = new Network();
   name = $state("");
   /** Counts changes of the drawn network. */
   revision = $state(0);
-  connection = $state<Connection>("connecting");
+  connection = $state<Connection>("closed");
+  /** Kind of the device that the recording in the spool is from. */
+  kind = $state<string>();
   sensing = $state(false);
   scanning = $state(false);
   /** Number of the curve being scanned, or of the next one; from 1. */
@@ -45,7 +45,7 @@ export class PhoneStore {
   #recorder: Recorder | undefined;
   #uplink: Uplink | undefined;
   #live: LiveSocket | undefined;
-  #stopSensor: StopSensor = () => undefined;
+  #stopSource: StopSource = () => undefined;
   #wakeLock: WakeLockSentinel | undefined;
   #committed = 0;
   #readings = 0;
@@ -67,15 +67,9 @@ export class PhoneStore {
       this.problem = inWords(error);
       return;
     }
-    const recorder = await Recorder.resume(this.#spool, newName, () => this.#stored());
-    this.#recorder = recorder;
-    this.curve = recorder.state.nextCurve + 1;
     const { location } = this.window;
-    this.#uplink = new Uplink(socketUrl("/api/v1/ingest", location), this.#hello(recorder), this.#spool, {
-      state: (state) => (this.connection = state),
-      committed: (seq) => this.#commit(seq),
-      refused: (words) => (this.problem = words),
-    });
+    const state = await this.#spool.state();
+    if (state) await this.#resume(state);
     this.#live = new LiveSocket(socketUrl(`/api/v1/sessions/${this.session}/live`, location), {
       message: (message) => this.#draw(this.network.apply(message)),
       state: () => undefined,
@@ -85,23 +79,26 @@ export class PhoneStore {
 
   close(): void {
     clearInterval(this.#timer);
-    this.#stopSensor();
+    this.#stopSource();
     void this.#wakeLock?.release();
     this.#uplink?.close();
     this.#live?.close();
   }
 
-  /** Ask for the sensors; from a tap. */
-  async allowSensors(): Promise<void> {
-    this.problem = "";
-    this.#stopSensor();
-    this.#stopSensor = await startSensor(this.window, {
+  /** Read this source; from a tap. */
+  async use(source: Source): Promise<void> {
+    this.problem = source.missing(this.window);
+    if (this.problem) return;
+    this.#stopSource();
+    this.#stopSource = await source.start(this.window, {
       reading: (reading) => this.#take(reading),
       failed: (words) => {
         this.sensing = false;
         this.problem = words;
       },
     });
+    const id = newName(source.kind);
+    if (!this.#recorder) await this.#resume(freshRecording(id, { id, ...source.device }));
     await this.stayAwake();
   }
 
@@ -154,6 +151,20 @@ export class PhoneStore {
     return Math.max(-1, ...this.nodes, ...this.network.nodes.keys()) + 1;
   }
 
+  async #resume(state: RecordingState): Promise<void> {
+    const recorder = await Recorder.resume(this.#spool, state, () => this.#stored());
+    this.#recorder = recorder;
+    this.kind = state.device.kind;
+    this.curve = recorder.state.nextCurve + 1;
+    const { recording, device } = state;
+    const hello: Hello = { type: "hello", versions: [1], recording, session: this.session, device };
+    this.#uplink = new Uplink(socketUrl("/api/v1/ingest", this.window.location), hello, this.#spool, {
+      state: (connection) => (this.connection = connection),
+      committed: (seq) => this.#commit(seq),
+      refused: (words) => (this.problem = words),
+    });
+  }
+
   async #end(discard: boolean): Promise<void> {
     this.scanning = false;
     this.marks = [];
@@ -195,28 +206,9 @@ export class PhoneStore {
     this.nodes = mergedNumbers(this.nodes, this.network.nodes.keys());
     this.revision += 1;
   }
-
-  #hello(recorder: Recorder): Hello {
-    const { recording } = recorder.state;
-    const reference = { acceleration: [0, 0, 1], magnetic: [0.5, 0, -0.8660254037844386] } as const;
-    return {
-      type: "hello",
-      versions: [1],
-      recording,
-      session: this.session,
-      device: {
-        id: recording,
-        kind: "phone",
-        name: "phone",
-        wheel: null,
-        mounting: MOUNTING,
-        reference: { acceleration: [...reference.acceleration], magnetic: [...reference.magnetic] },
-      },
-    };
-  }
 }
 
-function newName(): string {
+function newName(kind: string): string {
   const bytes = crypto.getRandomValues(new Uint8Array(8));
-  return `phone-${[...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+  return `${kind}-${[...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
 }

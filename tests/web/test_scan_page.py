@@ -1,5 +1,6 @@
-"""A phone that scans: the browser's own orientation sensor, driven sample by sample along a known curve."""
+"""A browser that scans: its own orientation sensor led along a known curve, and a Morphorider on its serial port."""
 
+import json
 import re
 import time
 from collections.abc import Iterator
@@ -11,8 +12,10 @@ from playwright.sync_api import Browser, CDPSession, Page, expect
 
 from tests.web.support import PATIENCE, Server, free_port, running_server
 from tracemesh.geometry.rotations import matrix_to_quaternion
+from tracemesh_bridge.framing import Frame, FrameLayout, encode
 
 SENSORS = ["accelerometer", "gyroscope", "magnetometer"]
+TICKS_PER_FRAME = 8
 TURN = 6.0
 """s that the phone takes around the circle."""
 
@@ -66,8 +69,8 @@ def test_a_circle_scanned_by_phone_survives_the_death_of_the_server(phone: Page,
         session = server.call("POST", "/sessions", {"name": "By phone"})["id"]
         hand = Hand(phone)
         hand.hold(0)
-        phone.goto(server.page(f"phone.html#{session}"))
-        phone.get_by_role("button", name="Use the sensors").click()
+        phone.goto(server.page(f"scan.html#{session}"))
+        phone.get_by_role("button", name="Use this device's sensors").click()
         hand.lead(0, 0.01)
         phone.get_by_role("button", name="Start curve").click()
         hand.lead(0.01, 0.02)
@@ -91,6 +94,47 @@ def test_a_circle_scanned_by_phone_survives_the_death_of_the_server(phone: Page,
     assert _roundness(points) < 0.05
 
 
+SERIAL_PORT = """(frames) => {
+  let controller, next = 0;
+  const bytes = (hex) => Uint8Array.from(hex.match(/../g), (pair) => parseInt(pair, 16));
+  const frame = () => bytes(frames[Math.min(next++, frames.length - 1)]);
+  const port = {
+    open: async () => {},
+    close: async () => {},
+    readable: new ReadableStream({ start: (given) => (controller = given) }),
+    writable: new WritableStream({ write: () => controller.enqueue(frame()) }),
+  };
+  Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
+}"""
+"""A port of the browser that answers each request with the next frame."""
+
+
+def test_a_morphorider_is_read_without_a_bridge(server: Server, page: Page) -> None:
+    session = server.call("POST", "/sessions", {"name": "By serial port"})["id"]
+    page.add_init_script(f"({SERIAL_PORT})({json.dumps(_frames())})")
+    page.goto(server.page(f"scan.html#{session}"))
+    page.get_by_role("button", name="Connect a Morphorider").click()
+    page.get_by_role("button", name="boundary").click()
+    page.get_by_role("button", name="Start curve").click()
+    expect(page.get_by_text(re.compile(r"^[1-9]\d\d samples$"))).to_be_visible()
+    page.get_by_role("button", name="Stop curve").click()
+    page.get_by_role("button", name="Done").click()
+    expect(page).to_have_url(re.compile(f"#/sessions/{session}$"))
+    (curve,) = server.call("GET", f"/sessions/{session}/curves")
+    assert curve["boundary"]
+    assert curve["samples"] >= 100
+    expected = (curve["samples"] - 1) * TICKS_PER_FRAME / 500 * 0.1
+    assert curve["length"] == pytest.approx(expected, rel=0.02)
+
+
+def _frames() -> list[str]:
+    """A Morphorider that rolls steadily on a table to the North, in hex."""
+    layout = FrameLayout()
+    up, north_and_down = (0.0, 0.5, 0.0), (0.25, -0.433, 0.0)
+    ticks = (divmod(TICKS_PER_FRAME * i, 500) for i in range(3000))
+    return [encode(layout, Frame((big, small), up, north_and_down)).hex() for big, small in ticks]
+
+
 def test_a_refused_permission_is_told(server: Server, browser: Browser) -> None:
     session = server.call("POST", "/sessions", {"name": "Refused"})["id"]
     context = browser.new_context(viewport={"width": 390, "height": 780}, permissions=[])
@@ -98,8 +142,8 @@ def test_a_refused_permission_is_told(server: Server, browser: Browser) -> None:
     devtools = context.new_cdp_session(page)
     for sensor in SENSORS:
         devtools.send("Browser.setPermission", {"permission": {"name": sensor}, "setting": "denied"})
-    page.goto(server.page(f"phone.html#{session}"))
-    page.get_by_role("button", name="Use the sensors").click()
+    page.goto(server.page(f"scan.html#{session}"))
+    page.get_by_role("button", name="Use this device's sensors").click()
     expect(page.get_by_role("alert")).to_contain_text("may not read the motion sensors")
     context.close()
 
@@ -109,8 +153,8 @@ def test_a_page_without_https_says_what_is_missing(server: Server, browser: Brow
     context = browser.new_context(viewport={"width": 390, "height": 780})
     context.add_init_script("Object.defineProperty(window, 'isSecureContext', { value: false })")
     page = context.new_page()
-    page.goto(server.page(f"phone.html#{session}"))
-    page.get_by_role("button", name="Use the sensors").click()
+    page.goto(server.page(f"scan.html#{session}"))
+    page.get_by_role("button", name="Use this device's sensors").click()
     expect(page.get_by_role("alert")).to_contain_text("HTTPS")
     context.close()
 

@@ -1,8 +1,8 @@
 import { mount } from "svelte";
 import "./app.css";
-import PhonePage from "./panels/phone/PhonePage.svelte";
+import ScanPage from "./panels/scan/ScanPage.svelte";
 import { Api } from "./protocol/api";
-import { PhoneStore } from "./state/phone.svelte";
+import { ScanStore } from "./state/scan.svelte";
 import { ViewStore } from "./state/view.svelte";
 
 const target = document.getElementById("app");
@@ -10,4 +10,4 @@ if (!target) throw new Error("The page has no #app element.");
 new ViewStore(document.documentElement, localStorage, (query) => matchMedia(query).matches);
 const session = location.hash.slice(1);
 
-mount(PhonePage, { target, props: { store: new PhoneStore(new Api(), session, window) } });
+mount(ScanPage, { target, props: { store: new ScanStore(new Api(), session, window) } });
