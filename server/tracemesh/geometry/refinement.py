@@ -42,7 +42,6 @@ STEPS = 3
 # Between the evidence of networks that gained (330 and more) and of those that lost (50 and less), among 21 cut from
 # meshes.
 ENOUGH_EVIDENCE = 130.0
-SMALLEST_ENERGY = 1e-20  # of a plane, which nothing can improve; the energy has no unit
 LARGEST_MOVE = 0.25  # of a patch that is still trusted, over the root of its area
 
 
@@ -80,7 +79,7 @@ def refine(vertices: Floats, normals: Floats, faces: Ints, patch: Ints, fixed: i
         if move < CONVERGED * size:
             break
     residual = _system(shape, length, size)[1]
-    gain = energies[0] / max(float(residual @ residual), SMALLEST_ENERGY)
+    gain = energies[0] / max(float(residual @ residual), 1e-30 * energies[0], np.finfo(float).tiny)
     kept = _untrusted(given, shape, patch)[:, None]
     return Refined(
         np.where(kept, vertices, shape.vertices),

@@ -23,6 +23,7 @@ from tracemesh.geometry.subdivision import subdivided
 Progress = Callable[[str, float], None]
 COARSE = 3.0  # edges inside the patches of the first solve, which only serves to unroll them, over those of the mesh
 LARGEST_UNROLLS = 4
+FARTHEST = 2.0  # distance of a vertex from the middle of the network, over its diagonal
 REBUILDS = 2  # solves in the metric of the last one; more change little
 
 
@@ -112,7 +113,9 @@ def _check_spread(complex_: CellComplex, patches: PatchMesh, vertices: Floats, n
     """Raise SurfaceError for a patch most of whose triangles are turned over: its boundary says too little
     about its inside.
     """
-    bad = inverted_faces(vertices, patches.faces, normals) | ~np.isfinite(vertices[patches.faces]).all((1, 2))
+    away = np.linalg.norm(vertices - complex_.network.points.mean(0), axis=1)
+    lost = ~(away < FARTHEST * complex_.network.diagonal)[patches.faces].all(1)
+    bad = inverted_faces(vertices, patches.faces, normals) | lost
     share = np.bincount(patches.patch, bad) / np.bincount(patches.patch)
     if share.max() > 0.5:
         corner = patches.vertex[patches.starts[int(share.argmax())]]

@@ -103,7 +103,7 @@ def _graded_lattice(loop: Floats, fixed: Floats, spacing: float) -> Floats:
 def _densified(loop: Floats, spacing: float) -> Floats:
     """Points along a polygon's edges, no farther from each other than the spacing."""
     edges = np.roll(loop, -1, axis=0) - loop
-    parts = np.ceil(np.linalg.norm(edges, axis=1) / spacing).astype(np.int64)
+    parts = np.ceil(np.linalg.norm(edges, axis=1) / spacing - 1e-6).astype(np.int64)
     step = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     return np.asarray(np.repeat(loop, parts, axis=0) + np.repeat(edges / parts[:, None], parts, axis=0) * step[:, None])
 
