@@ -34,6 +34,17 @@ def test_planted_headings_are_found_and_taken_back(
     assert misfit(result.network.points, truth).mean() < 0.4 * without
 
 
+@pytest.mark.parametrize("name", ["leaf", "torus", "egg"])
+def test_headings_of_ten_degrees_are_taken_back_in_rounds(
+    faulty_scan: Callable, true_points: Callable, misfit: Callable, name: str
+) -> None:
+    faulty = faulty_scan(name, seed=1, noise=0.02, heading=np.radians(10))
+    result = run(faulty.scan, "auto")
+    truth = true_points(result.network, faulty.curves)
+    without = misfit(run(faulty.scan, "off").network.points, truth).mean()
+    assert misfit(result.network.points, truth).mean() < 0.12 * without
+
+
 def test_planted_scales_and_marks_are_taken_back(
     faulty_scan: Callable, true_points: Callable, misfit: Callable
 ) -> None:

@@ -30,12 +30,16 @@ class Corrections:
     scale: Floats
     shift: Floats
 
+    def followed_by(self, second: "Corrections") -> "Corrections":
+        """These and then others, found on the corrected curves; they add, but for products of small numbers."""
+        return Corrections(*(a + b for a, b in zip(vars(self).values(), vars(second).values(), strict=True)))
+
 
 class Adjustment:
     """Normal equations of a network, factorised."""
 
-    def __init__(self, misclosures: Misclosures, variances: Variances) -> None:
-        """Factorise for given variances."""
+    def __init__(self, misclosures: Misclosures, variances: Variances, before: Corrections | None = None) -> None:
+        """Factorise for given variances; before: corrections made already, which count as much as those to come."""
         self._m = misclosures
         s, n = misclosures.segments, misclosures.normals
         by_s, by_n = 1 / np.sqrt(variances.segments), 1 / np.sqrt(variances.normals)
@@ -44,8 +48,12 @@ class Adjustment:
         if variances.with_bias:
             parts = [[*parts[0], by_s * s.shared], [*parts[1], by_n * n.shared]]
         self._rows: csc_array = block_array(parts, format="csc")
-        self._right = np.concatenate([by_s * s.y, by_n * n.y])
+        right = np.concatenate([by_s * s.y, by_n * n.y])
         self._root = self._prior_root(variances)
+        self._pull = self._rows.T @ right
+        if before is not None:
+            theta = np.concatenate([before.rotation.ravel(), before.scale, before.shift])
+            self._pull[self._free :] -= (self._root @ self._root.T)[self._free :, self._free :] @ theta
         self._factors: SuperLU = splu((self._rows.T @ self._rows + self._root @ self._root.T).tocsc())
 
     def _prior_root(self, variances: Variances) -> csc_array:
@@ -60,7 +68,7 @@ class Adjustment:
 
     def solution(self) -> Corrections:
         """The most probable corrections."""
-        return self._split(self._factors.solve(self._rows.T @ self._right))
+        return self._split(self._factors.solve(self._pull))
 
     def draws(self, count: int, random: np.random.Generator) -> Corrections:
         """Deviations from the solution, as probable as the truth's own; the first axis counts them."""

@@ -1,7 +1,7 @@
 """Whether the curves of a network have errors as a whole, and which: variances first, then the adjustment."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -9,12 +9,19 @@ from numpy.typing import NDArray
 
 from tracemesh.geometry.adjustment import Adjustment, Corrections
 from tracemesh.geometry.bias import Variances, estimate_variances
+from tracemesh.geometry.correction import correct_curves
 from tracemesh.geometry.misclosure import Misclosures
-from tracemesh.geometry.placement import PlacedCurve
-from tracemesh.geometry.samples import Layout
-from tracemesh.geometry.weights import Choice, noise_level
+from tracemesh.geometry.placement import PlacedCurve, moved_layout
+from tracemesh.geometry.resampling import resample
+from tracemesh.geometry.rotations import exp
+from tracemesh.geometry.samples import Layout, NetworkSamples
+from tracemesh.geometry.weights import Choice, noise_level, smooth_frames
 
 Floats = NDArray[np.float64]
+Mode = Literal["auto", "on", "off"]
+
+_ROUNDS = 4
+_SMALL = 0.04  # rad; the equations err by half the square of what they are about
 
 _CLEARLY = 1.5  # more than chance makes of a few loops
 _FIRST_SHIFT = 0.05  # steps: a first guess at the deviation of node marks
@@ -52,9 +59,20 @@ class Closing:
         return ratio if ratio > _CLEARLY else 1.0
 
 
-def close_network(
-    curves: Sequence[PlacedCurve], layout: Layout, choice: Choice, step: float, mode: Literal["auto", "on", "off"]
-) -> Closing:
+@dataclass(frozen=True)
+class Closed:
+    """Samples of curves freed from their errors as a whole, and a smooth start (n, 3, 3) for their regression.
+
+    closing: of these samples. found: the errors taken back, all rounds together, with the variances of the first.
+    """
+
+    samples: NetworkSamples
+    start: Floats
+    closing: Closing
+    found: Closing
+
+
+def _first(curves: Sequence[PlacedCurve], layout: Layout, choice: Choice, step: float, mode: Mode) -> Closing:
     """Errors of whole curves from the smoothed frames of `choice`, if `mode` or the data ask for them."""
     noise = noise_level(curves, choice, step)
     misclosures = Misclosures(layout, choice.frames, noise)
@@ -63,3 +81,31 @@ def close_network(
     variances = with_bias if mode == "on" or (mode == "auto" and gain > 0 and with_bias.plausible) else without
     adjustment = Adjustment(misclosures, variances)
     return Closing(variances, adjustment, adjustment.solution(), gain, noise.walk * variances.segments, noise.drift)
+
+
+def _next(found: Closing, curves: Sequence[PlacedCurve], layout: Layout, choice: Choice, step: float) -> Closing:
+    """What is left of the errors found so far; the noise is estimated again, without what large rotations added."""
+    noise = noise_level(curves, choice, step)
+    misclosures = Misclosures(layout, choice.frames, noise)
+    _, left = estimate_variances(misclosures, _FIRST_SHIFT * step)
+    variances = replace(found.variances, segments=left.segments, normals=left.normals)
+    adjustment = Adjustment(misclosures, variances, found.corrections)
+    return Closing(variances, adjustment, adjustment.solution(), found.gain, noise.walk * left.segments, noise.drift)
+
+
+def close_network(
+    curves: Sequence[PlacedCurve], samples: NetworkSamples, choice: Choice, step: float, mode: Mode
+) -> Closed:
+    """Find errors of whole curves and take them back; large rotations, for which the equations are rough, in rounds."""
+    found = closing = _first(curves, samples.layout, choice, step, mode)
+    start = choice.frames
+    for left in reversed(range(_ROUNDS if closing.variances.with_bias else 0)):
+        curves = correct_curves(curves, closing.corrections)
+        start = exp(closing.corrections.rotation)[samples.layout.curve] @ choice.frames
+        samples = resample(curves, moved_layout(samples.layout, curves), step)
+        if not left or np.abs(closing.corrections.rotation).max() < _SMALL:
+            break
+        choice = replace(choice, frames=smooth_frames(curves, samples, choice.weights))
+        closing = _next(found, curves, samples.layout, choice, step)
+        found = replace(found, corrections=found.corrections.followed_by(closing.corrections))
+    return Closed(samples, start, closing, found)

@@ -48,7 +48,8 @@ def check_connected(layout: Layout, curve_indices: Ints) -> None:
         return
     piece = label[layout.nodes[np.searchsorted(layout.marks, layout.first[:-1])]]
     names = [", ".join(curve_name(c) for c in curve_indices[piece == p]) for p in np.unique(piece)]
-    raise PiecesError(f"the network is in {count} pieces that share no node: " + "; ".join(f"({name})" for name in names))
+    pieces = "; ".join(f"({name})" for name in names)
+    raise PiecesError(f"the network is in {count} pieces that share no node: {pieces}")
 
 
 def node_positions(layout: Layout, vectors: Floats, weights: Floats) -> Floats:

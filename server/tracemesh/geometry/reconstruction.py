@@ -11,18 +11,16 @@ from numpy.typing import NDArray
 from tracemesh.errors import ScanError
 from tracemesh.geometry.assembly import assemble_network, per_point
 from tracemesh.geometry.cleaning import CleanCurve, clean_curves, curve_name
-from tracemesh.geometry.closing import Closing, close_network
-from tracemesh.geometry.correction import correct_curves
+from tracemesh.geometry.closing import Closed, close_network
 from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.network_report import bias_report, fit_warnings
-from tracemesh.geometry.placement import PlacedCurve, measured_layout, moved_layout, place_curve, uniform_layout
+from tracemesh.geometry.placement import PlacedCurve, measured_layout, place_curve, uniform_layout
 from tracemesh.geometry.polyline import MeasuredNetwork, measure_network, points_on_polyline
 from tracemesh.geometry.positions import Positions, check_connected, solve_positions
 from tracemesh.geometry.quadrature import edge_vectors
 from tracemesh.geometry.regression import Regression, RegressionSolver
 from tracemesh.geometry.resampling import resample
-from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.samples import Layout, NetworkSamples
 from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.uncertainty import point_uncertainty
@@ -111,8 +109,9 @@ class NetworkReconstruction:
         self._stages.begin("weighing")
         self._choice = choose_weights(curves, samples, self._step)
         self._stages.begin("closing")
-        self._closing: Closing | None = None
-        self._samples = self._close(curves, samples)
+        self._closed = self._close(curves, samples)
+        self._samples = self._closed.samples if self._closed else samples
+        self._start = self._closed.start if self._closed else self._choice.frames
         self._solver = RegressionSolver(self._samples.layout)
         self._stages.end()
 
@@ -123,18 +122,11 @@ class NetworkReconstruction:
         _check_closed(curves, measured)
         return measured
 
-    def _close(self, curves: Sequence[PlacedCurve], samples: NetworkSamples) -> NetworkSamples:
-        """Samples of curves freed from their errors as a whole, if they have any; a polyline is exact as it is."""
-        self._start = self._choice.frames
+    def _close(self, curves: Sequence[PlacedCurve], samples: NetworkSamples) -> Closed | None:
+        """The network freed from errors of whole curves; None for a polyline, which is exact as it is."""
         if self._measured.is_polyline:
-            return samples
-        mode = self._parameters.curve_bias
-        self._closing = close_network(curves, samples.layout, self._choice, self._step, mode)
-        if not self._closing.variances.with_bias:
-            return samples
-        corrected = correct_curves(curves, self._closing.corrections)
-        self._start = exp(self._closing.corrections.rotation)[samples.layout.curve] @ self._choice.frames
-        return resample(corrected, moved_layout(samples.layout, corrected), self._step)
+            return None
+        return close_network(curves, samples, self._choice, self._step, self._parameters.curve_bias)
 
     def solve(self, weights: Weights | None = None) -> NetworkResult:
         """The network, smoothed with the chosen weights or with others; the latter starts from the solution before."""
@@ -152,9 +144,9 @@ class NetworkReconstruction:
         return NetworkResult(network, per_point(layout, regression.frames), per_point(layout, uncertainty), report)
 
     def _uncertainty(self, layout: Layout, positions: Positions, frames: Floats) -> Floats:
-        if self._closing is None:
+        if self._closed is None:
             return np.full(layout.size, self._measured.chord_residual)
-        closing, tangent = self._closing, frames[:, :, 0]
+        closing, tangent = self._closed.closing, frames[:, :, 0]
         expected = point_uncertainty(closing.adjustment, layout, positions.points, tangent, closing.walk)
         return expected * closing.noise_factor(layout, positions.gaps)
 
@@ -164,9 +156,9 @@ class NetworkReconstruction:
         return solve_positions(layout, edge_vectors(layout, frames))
 
     def _warnings(self, layout: Layout, positions: Positions) -> list[str]:
-        if self._closing is None:
+        if self._closed is None:
             return []
-        return fit_warnings(layout, positions.gaps, self._closing.expected_gaps(layout), self._indices)
+        return fit_warnings(layout, positions.gaps, self._closed.closing.expected_gaps(layout), self._indices)
 
     def _report(
         self,
@@ -183,7 +175,7 @@ class NetworkReconstruction:
                 "step_m": self._step,
                 "stretch_m": weights.stretch,
                 "bend_m": weights.bend,
-                "curve_bias": "on" if self._closing and self._closing.variances.with_bias else "off",
+                "curve_bias": "on" if self._closed and self._closed.found.variances.with_bias else "off",
                 "tangents": "chords to the next sample" if measured.is_polyline else "tangents of the curve",
             },
             "sizes": {
@@ -197,7 +189,7 @@ class NetworkReconstruction:
                 "diagonal_m": network.diagonal,
             },
             "frame_noise_deg": float(np.rad2deg(self._choice.noise)),
-            "curve_bias": bias_report(self._closing, self._indices),
+            "curve_bias": bias_report(self._closed.found if self._closed else None, self._indices),
             "closure": {"rms_m": float(np.sqrt(np.mean(gaps**2))), "max_m": float(gaps.max())},
             "uncertainty": {"mean_m": float(uncertainty.mean()), "max_m": float(uncertainty.max())},
             "regression": {"energy": regression.energy, "iterations": regression.iterations},

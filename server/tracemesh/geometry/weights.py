@@ -82,22 +82,19 @@ def _vertex(logs: list[float], errors: list[float]) -> float:
     return float(np.clip(b - slope * (c - a) / 2 / curvature, a, c)) if curvature > 0 else float(b)
 
 
-def _trials(curves: Sequence[PlacedCurve], samples: NetworkSamples, step: float) -> _Trials | None:
-    """Trials on the first curves of a large network; None for one that is small enough as a whole."""
-    few = curves[: int(np.searchsorted(samples.layout.first, _ENOUGH_ROWS))]
-    if len(few) == len(curves):
-        return None
-    part = samples.first_curves(len(few))
-    return _Trials(DevelopedSpline(part), measured_offsets(few, part), _folds(few, step))
-
-
 def choose_weights(curves: Sequence[PlacedCurve], samples: NetworkSamples, step: float) -> Choice:
     """Weights that predict left-out frames best, on as many of the curves as it takes to know them well."""
-    offsets, spline = measured_offsets(curves, samples), DevelopedSpline(samples)
-    trials = _trials(curves, samples, step) or _Trials(spline, offsets, _folds(curves, step))
+    few = curves[: max(1, int(np.searchsorted(samples.layout.first, _ENOUGH_ROWS)))]
+    part = samples if len(few) == len(curves) else samples.first_curves(len(few))
+    trials = _Trials(DevelopedSpline(part), measured_offsets(few, part), _folds(few, step))
     weights = _search(trials, step)
-    smooth = spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(weights))
-    return Choice(weights, trials.error(weights), spline.frames(smooth))
+    return Choice(weights, trials.error(weights), smooth_frames(curves, samples, weights))
+
+
+def smooth_frames(curves: Sequence[PlacedCurve], samples: NetworkSamples, weights: Weights) -> Floats:
+    """Frames (n, 3, 3) of splines through what was measured, at the rows of its samples."""
+    offsets, spline = measured_offsets(curves, samples), DevelopedSpline(samples)
+    return spline.frames(spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(weights)))
 
 
 def _search(trials: _Trials, step: float) -> Weights:
