@@ -147,7 +147,8 @@ def test_a_full_disk_is_said_and_costs_nothing_once_there_is_room(bench):
     bridge = bench.bridge()
     record_a_curve(bench, bridge, 50)
     _, hard = resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE)
-    resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE, (5000, hard))
+    (segment,) = (bench.folder / "spool").glob("*/0*.ndjson")
+    resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE, (segment.stat().st_size + 3001, hard))  # in mid-message
     bridge.says("cannot write the spool")
     bench.samples(100)
     resource.prlimit(bridge.pid, resource.RLIMIT_FSIZE, (hard, hard))

@@ -107,6 +107,25 @@ def test_what_a_device_said_before_it_was_asked_is_dropped(wire):
     assert Rig(port).frames(3) == [frame(0, n).hex() for n in range(1, 4)]
 
 
+def test_the_rest_of_an_answer_that_comes_too_late_is_no_part_of_the_next_one(wire):
+    master, port = wire
+    good = [frame(0, n) for n in range(1, 5)]
+
+    def serve():
+        with suppress(OSError):
+            for n, answer in enumerate(good):
+                os.read(master, 1)
+                os.write(master, answer[:12] if n == 1 else answer)
+                if n == 1:
+                    time.sleep(0.31)
+                    os.write(master, answer[12:])
+
+    threading.Thread(target=serve, daemon=True).start()
+    rig = Rig(port, timeout=0.3)
+    assert rig.frames(3) == [f.hex() for f in (good[0], good[2], good[3])]
+    assert rig.host.health.faults == {"short": 1}
+
+
 def test_a_device_that_babbles_is_not_waited_for_for_ever(wire, monkeypatch):
     master, port = wire
     monkeypatch.setattr(morphorider, "QUIET", 0.001)

@@ -160,6 +160,18 @@ def test_sensorlogger_pose(pose, apple, host, said):
     assert said == ["device: live: phone d"]
 
 
+def test_sensorlogger_without_gravity_is_taken_as_it_is(host):
+    pose = POSES["standing, turned 90"]
+    source = SensorLogger(("127.0.0.1", 0), DEVICE, host)
+    batch = parse_batch(logger_message(pose, apple=False), 0.0)
+    only = Batch(0, "s", "d", tuple(e for e in batch.entries if e.name == "orientation"), 0.0)
+    try:
+        reading = next(source._read(only))
+    finally:
+        source._server.server_close()
+    assert np.allclose(turn(reading.quaternion, (0, 1, 0)), pose.apply((0, 1, 0)))
+
+
 def batch(number, session="s", received=0.0):
     return Batch(number, session, "phone", (), received)
 

@@ -62,8 +62,8 @@ STEPS = {
 }
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.sampled_from([*STEPS, *["sample"] * 6]), max_size=80))
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.sampled_from([*STEPS, "sample", "sample", "sample", "start"]), min_size=10, max_size=60))
 def test_whatever_is_pressed_and_whenever_it_is_killed_every_sample_of_a_curve_is_recorded_once(
     tmp_path_factory, steps
 ):
@@ -105,6 +105,20 @@ def test_a_mark_is_at_the_newest_sample(spool):
         recorder.add(reading(number))
     recorder.mark(6)
     assert [(m.sample, m.node) for m in messages(spool) if isinstance(m, NodeMark)] == [(0, 5), (22, 6)]
+
+
+def test_a_killed_bridge_goes_on_with_the_samples_that_were_in_no_message_yet(spool, tmp_path):
+    recorder = Recorder(spool)
+    recorder.start(boundary=False)
+    for number in range(BATCH + 3):
+        recorder.add(reading(number))
+    spool = Spool(tmp_path, HELLO)
+    recorder = Recorder(spool)
+    recorder.add(reading(BATCH + 3))
+    recorder.flush()
+    times = [t for m in messages(spool) if isinstance(m, Samples) for t in m.received]
+    assert times == [float(n) for n in range(BATCH + 4)]
+    spool.close()
 
 
 def test_marks_are_taken_back_newest_first_after_a_restart_too(spool, tmp_path):

@@ -70,6 +70,7 @@ class Morphorider:
 
     def _frames(self, line: serial.Serial, port: str, stop: threading.Event) -> Iterator[Reading]:
         due = last_good = self._host.clock.now()
+        period = 1 / self._settings.rate
         while not stop.is_set():
             frame = self._ask(line)
             now = self._host.clock.now()
@@ -83,8 +84,8 @@ class Morphorider:
                 return
             elif now - last_good > STALE_AFTER and self._link.state is LinkState.LIVE:
                 self._link.to(LinkState.STALE, f"{port}: no good answer for {STALE_AFTER:.0f} s")
-            due = max(due + 1 / self._settings.rate, now)
-            stop.wait(due - now)
+            due = max(due + period, now - period)  # a reading or two late is made up for, no more
+            stop.wait(max(0.0, due - now))
 
     def _believe(self, frame: Frame, now: float) -> Reading | None:
         ticks = self._odometer.follow(frame.ticks, now)
