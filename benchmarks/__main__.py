@@ -6,7 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from time import perf_counter
 
-from benchmarks import accuracy, growth, nodes, noisy, regression, surfacing, times
+from benchmarks import accuracy, growth, lengths, nodes, noisy, regression, surfacing, times
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
 from benchmarks.report import read_report, record, write_report
@@ -21,6 +21,7 @@ TABLES: dict[str, Callable[[Data], Table]] = {
     "steps": accuracy.steps,
     "weights": accuracy.weights,
     "surfaces": accuracy.surfaces,
+    "lengths": lengths.lengths,
     "times": times.times,
     "regression": regression.regression,
     "growth": growth.growth,

@@ -27,14 +27,16 @@ AXES = ("t", "N", "B")
 
 
 def orientation() -> Figure:
-    """Frames along the curves, and how far the measured ones are from the true ones."""
+    """What the sensors say, and the frames along the curves that follow from it."""
     drawn = figure()
     result = reconstruct_network(noisy_scan("leaf").scan)
     points = result.network.points
     axes = space(drawn, points, 121, "frames A = [t N B]")
     draw_network(axes, result.network, GREY, 0.8)
-    for k, colour in enumerate((ORANGE, BLUE, GREEN)):
+    for k, (name, colour) in enumerate(zip(AXES, (ORANGE, BLUE, GREEN), strict=True)):
         axes.quiver(*points[::6].T, *(0.045 * result.frames[::6, :, k].T), color=colour, linewidth=0.8)
+        axes.plot([], [], [], color=colour, label=name)
+    axes.legend(fontsize=7, frameon=False, loc="lower left", ncols=3)
     plan = plan_scan(leaf(), seed=1)
     time = np.linspace(10, 25, 900)
     readings = plan.readings(time, np.random.default_rng(1))

@@ -1,17 +1,19 @@
 """Every table of the benchmarks runs on its smallest size, and what is written can be read."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import accuracy, growth, nodes, noisy, regression, surfacing, times
+from benchmarks import accuracy, growth, lengths, nodes, noisy, regression, surfacing, times
 from benchmarks.data import Data
 from benchmarks.report import read_report, record, write_report
 from benchmarks.table import Column, Table
 from benchmarks.thesis_energy import ThesisEnergy
 from tracemesh.geometry.energy import EnergyPoint
+from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.shapes import leaf
 from tracemesh.geometry.simulation import exact_scan
 from tracemesh.geometry.stencil import Stencil
@@ -85,6 +87,20 @@ def test_weights_and_surfaces() -> None:
 def test_noisy_and_uncertainty() -> None:
     assert 0 < numbers(noisy.noisy(WITHOUT, ("leaf",)), 2)[0] < 0.5
     assert 0.2 < numbers(noisy.uncertainty(WITHOUT, ("leaf",), 1), 1)[0] < 5
+
+
+def test_lengths() -> None:
+    (row,) = lengths.lengths(WITHOUT, ("leaf",)).rows
+    wheel, measured, alone = (float(cell or 0) for cell in row[1:])
+    assert 0 < wheel < 0.3
+    assert 0 < measured < alone
+
+
+def test_given_lengths_are_those_between_nodes() -> None:
+    shape, scan = leaf(), exact_scan(leaf(), 0.01)
+    wrong = Scan(tuple(replace(c, distance=c.distance**2 + 5) for c in scan.curves))
+    for known, curve in zip(shape.curves, lengths.with_lengths(wrong, shape.curves).curves, strict=True):
+        assert curve.distance[curve.node_samples] == pytest.approx(known.node_positions)
 
 
 def test_nodes() -> None:
