@@ -4,20 +4,23 @@ import asyncio
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
 
 from tracemesh.api.live.drawing import flat
 from tracemesh.errors import Conflict, TracemeshError
 from tracemesh.geometry.scan import Floats, Scan
 from tracemesh.jobs.attached import SolvedNetwork, solve_network
+from tracemesh.jobs.proposals import propose_nodes
 from tracemesh.jobs.slot import Slot
 from tracemesh.storage.curves import list_curves
 from tracemesh.storage.database import Database
 from tracemesh.storage.scans import load_scan
 from tracemesh.wire.live import LiveCurve, Preview
-from tracemesh.wire.resources import Curve, NodePosition, ReconstructionParameters
+from tracemesh.wire.resources import Curve, NodePosition, NodeProposals, ReconstructionParameters
 
 MAX_SCANS = 8
 """Sessions whose scan is kept in memory."""
+T = TypeVar("T")
 Loaded = tuple[Scan, list[int], list[Curve]]
 
 
@@ -52,17 +55,24 @@ class Previewer:
             async with self._turn:
                 if self._newest[session, client] is not wish:
                     raise Conflict("the same client asked for another preview meanwhile")
-                return _preview(await self._run(scan, indices, parameters), curves)
+                return _preview(await self._run(solve_network, scan, indices, parameters), curves)
         finally:
             if self._newest.get((session, client)) is wish:
                 del self._newest[session, client]
 
-    async def _run(self, scan: Scan, indices: Sequence[int], parameters: ReconstructionParameters) -> SolvedNetwork:
+    async def propose(self, session: str) -> NodeProposals:
+        """Nodes that were found in a session; raises NotFound and ScanError."""
+        scan, indices, curves = await self._scan(session)
+        by_index = {curve.index: curve for curve in curves}
+        async with self._turn:
+            return await self._run(propose_nodes, scan, [by_index[i] for i in indices])
+
+    async def _run(self, function: Callable[..., T], *arguments: object) -> T:
         try:
-            return await asyncio.wrap_future(self._slot.submit(solve_network, scan, indices, parameters))
+            return await asyncio.wrap_future(self._slot.submit(function, *arguments))
         except BrokenProcessPool:
             self._slot.renew()
-            raise TracemeshError("the process that solves previews was lost; ask again") from None
+            raise TracemeshError("the process that does it was lost; ask again") from None
 
     async def _scan(self, session: str) -> Loaded:
         if session not in self._scans:

@@ -7,6 +7,12 @@ import numpy as np
 from tracemesh.geometry.scan import CurveScan
 
 
+def sample_as_scanned(sample: int, first_mark: int, count: int) -> int:
+    """Where a sample of a closed curve of `count` was before `from_first_node` made it begin at `first_mark`."""
+    after = first_mark + sample
+    return after if after < count else after - count + 1
+
+
 def from_first_node(curve: CurveScan) -> CurveScan:
     """A closed curve that goes from its first node around to the same node, wherever its measurement began.
 

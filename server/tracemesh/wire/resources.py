@@ -63,6 +63,28 @@ class CurveUpdate(Message):
     marks: list[Mark] | None = Field(default=None, max_length=10_000, description="replace all marks of the curve")
 
 
+class NodePlace(Message):
+    """Where a node is on one of its curves."""
+
+    curve: Count = Field(description="index within the session")
+    sample: Count
+
+
+class NodeProposal(Message):
+    """A node that was found, or one marked already; accepted by marking its places with PATCH on their curves."""
+
+    places: list[NodePlace]
+    confidence: float = Field(ge=0, le=1)
+    node: Count | None = Field(default=None, description="its number, if it is marked already")
+
+
+class NodeProposals(Message):
+    """GET /sessions/{session}/node-proposals."""
+
+    proposals: list[NodeProposal]
+    unplaced: list[Count] = Field(description="curves of which nothing is known: no place was found for them")
+
+
 class RecordingSummary(Message):
     """A recording of a session: what one device sent, or one uploaded file."""
 
