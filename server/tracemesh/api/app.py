@@ -18,7 +18,7 @@ from tracemesh.api.live.hub import Hub
 from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
-from tracemesh.api.routes import curves, ingest, live, pages, proposals, reconstructions, recordings, sessions
+from tracemesh.api.routes import archives, curves, ingest, live, pages, proposals, reconstructions, recordings, sessions
 from tracemesh.api.services import Services
 from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
@@ -57,7 +57,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     install_handlers(app)
     api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
-    for module in (sessions, curves, recordings, proposals, reconstructions, ingest, live):
+    for module in (archives, sessions, curves, recordings, proposals, reconstructions, ingest, live):
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(pages.router)

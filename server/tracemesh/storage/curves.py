@@ -30,12 +30,13 @@ def update_curve(transaction: Transaction, session: str, index: int, change: Cur
         if value is not None:
             setattr(row, name, value)
     if change.marks is not None:
-        _replace_marks(transaction, row, change.marks)
+        replace_marks(transaction, row, change.marks)
     transaction.flush()
     return _curve(transaction, row)
 
 
-def _replace_marks(transaction: Transaction, row: CurveRow, marks: Iterable[Mark]) -> None:
+def replace_marks(transaction: Transaction, row: CurveRow, marks: Iterable[Mark]) -> None:
+    """Give a curve these marks instead of its own; raises InputError for one beyond its samples."""
     transaction.execute(delete(MarkRow).where(_belongs_to(row)))
     for mark in marks:
         if mark.sample >= row.samples:
