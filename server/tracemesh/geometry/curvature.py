@@ -4,6 +4,7 @@ The printed -|H| N bends every patch outwards; the component along the normal ke
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracemesh.geometry.laplacian import lumped_mass, triangle_areas
 from tracemesh.geometry.network import Floats, Ints
@@ -22,6 +23,22 @@ def mean_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
     flux = 0.5 * (np.cross(opposite, facing[:, None]) * normals[faces]).sum(2)
     total = np.bincount(faces.ravel(), flux.ravel(), len(vertices))
     return np.asarray(-0.5 * total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
+
+
+def extended_to_boundary(values: Floats, faces: Ints, open_boundary: NDArray[np.bool_]) -> Floats:
+    """(n,) values with those on the open boundary replaced by the mean of their neighbours', inside ones first.
+
+    values, open_boundary: (n,). faces: (f, 3).
+    """
+    values, known = values.copy(), ~open_boundary
+    start, end = (np.roll(faces, -k, axis=1).ravel() for k in range(2))
+    one, other = np.concatenate([start, end]), np.concatenate([end, start])
+    for _ in range(2):  # the tip of an acute corner has neighbours on the boundary only
+        weight = np.bincount(one, known[other], len(values))
+        mean = np.bincount(one, values[other] * known[other], len(values)) / np.maximum(weight, 1)
+        new = ~known & (weight > 0)
+        values[new], known = mean[new], known | new
+    return values
 
 
 def normalised(vectors: Floats) -> Floats:

@@ -9,7 +9,8 @@ import numpy as np
 
 from tracemesh.errors import SurfaceError
 from tracemesh.geometry.cell_complex import CellComplex, cell_complex, segment_name
-from tracemesh.geometry.curvature import mean_curvature
+from tracemesh.geometry.curvature import extended_to_boundary, mean_curvature
+from tracemesh.geometry.edges import boundary_vertices
 from tracemesh.geometry.laplacian import cotangent_laplacian, surface_laplacian
 from tracemesh.geometry.linear_surface import linear_surface, rebuilt_surface
 from tracemesh.geometry.mesh import Mesh
@@ -23,6 +24,7 @@ from tracemesh.geometry.subdivision import subdivided
 Progress = Callable[[str, float], None]
 COARSE = 3.0  # edges inside the patches of the first solve, which only serves to unroll them, over those of the mesh
 LARGEST_UNROLLS = 4
+LARGEST_AUTOMATIC = 50_000  # vertices; the factorisation of the refinement grows faster than the mesh
 FARTHEST = 2.0  # distance of a vertex from the middle of the network, over its diagonal
 REBUILDS = 2  # solves in the metric of the last one; more change little
 
@@ -68,17 +70,27 @@ def span_surface(
         complex_ = complex_.resampled(subdivided(complex_.network, parameters.mesh_size))
     patches, vertices, normals = _linear(complex_, parameters, stages)
     _check_spread(complex_, patches, vertices, normals)
-    refinement: dict[str, object] = {"mode": parameters.refinement, "used": False}
-    if parameters.refinement != "off":
-        stages.begin("refinement", 0.5)
-        refined = refine(vertices, normals, patches.faces, patches.patch, patches.fixed)
-        refinement["evidence"] = refined.evidence
-        if refined.convincing or parameters.refinement == "on":
-            refinement["used"] = True
-            vertices, normals = refined.vertices, refined.normals
+    vertices, normals, refinement = _refined(patches, vertices, normals, parameters.refinement, stages)
     stages.end()
-    mesh = Mesh(vertices, patches.faces, normals, mean_curvature(vertices, patches.faces, normals), patches.patch)
+    faces, boundary = patches.faces, boundary_vertices(patches.faces, patches.count)
+    curvature = extended_to_boundary(mean_curvature(vertices, faces, normals), faces, boundary)
+    mesh = Mesh(vertices, faces, normals, curvature, patches.patch)
     return SurfaceResult(mesh, _report(mesh, complex_, stages) | {"refinement": refinement})
+
+
+def _refined(
+    patches: PatchMesh, vertices: Floats, normals: Floats, mode: str, stages: "_Stages"
+) -> tuple[Floats, Floats, dict[str, object]]:
+    """Vertices and normals, refined if that is wanted and convincing, and what the report says about it."""
+    report: dict[str, object] = {"mode": mode, "used": False}
+    if mode == "off" or (mode == "auto" and patches.count > LARGEST_AUTOMATIC):
+        return vertices, normals, report
+    stages.begin("refinement", 0.5)
+    refined = refine(vertices, normals, patches.faces, patches.patch, patches.fixed)
+    report["evidence"] = refined.evidence
+    if mode == "auto" and not refined.convincing:
+        return vertices, normals, report
+    return refined.vertices, refined.normals, report | {"used": True}
 
 
 def _linear(
