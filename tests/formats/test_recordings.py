@@ -92,6 +92,24 @@ def test_a_mounting_turns_the_devices_axes_into_the_frame() -> None:
     np.testing.assert_allclose(scan.curves[0].normal, frames.as_matrix()[:, :, 1], atol=1e-12)
 
 
+def test_a_gyroscope_is_fused_with_the_vectors() -> None:
+    count = 120
+    turn = Rotation.from_rotvec(np.linspace(0, 1, count)[:, None] * [0.0, 0.0, 1.0])
+    shake = 4.0 * np.sin(np.linspace(0, 60, count))[:, None] * [1.0, 0.0, 0.0]
+    columns = {
+        "time": (np.arange(count) / 60).tolist(),
+        "rotation_rate": np.tile([0.0, 0.0, 60 / (count - 1)], (count, 1)).tolist(),
+        "acceleration": turn.inv().apply(shake + [0.0, 0.0, 9.81]).tolist(),
+        "magnetic": turn.inv().apply([0.0, 22.0, -42.0]).tolist(),
+    }
+    errors = []
+    for used in (columns, {k: v for k, v in columns.items() if k != "rotation_rate"}):
+        block = Samples.model_validate({"seq": 0, "curve": 0, "first_sample": 0, **used})
+        scan = scan_from_recordings([recording(*curve(block), reference={"magnetic": [0.0, 22.0, -42.0]})]).curves[0]
+        errors.append(np.linalg.norm(scan.tangent - turn.as_matrix()[:, :, 0], axis=1).max())
+    assert errors[0] < 0.05 < errors[1]
+
+
 def test_a_quaternion_and_its_negative_are_the_same_orientation() -> None:
     plain = quaternions(10)
     assert plain.quaternion is not None

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from tracemesh.errors import InputError, ScanError
 from tracemesh.geometry.closed_curves import from_first_node
+from tracemesh.geometry.fusion import frames_from_imu
 from tracemesh.geometry.odometry import distance_from_ticks, distance_from_time
 from tracemesh.geometry.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
 from tracemesh.geometry.rotations import quaternion_to_matrix
@@ -246,12 +247,15 @@ def _marks(raw: _RawCurve) -> tuple[Ints, Ints]:
 
 
 def _orientation(columns: dict[str, Floats], device: Device) -> tuple[Floats, Floats]:
-    """Tangents and normals: as sent, or from quaternions, or from vectors."""
+    """Tangents and normals: as sent, or from quaternions, or from a gyroscope and vectors, or from vectors alone."""
     if {"tangent", "normal"} <= columns.keys():
         return columns["tangent"], columns["normal"]
     mounting = quaternion_to_matrix(np.array(device.mounting))
     if "quaternion" in columns:
         frames = frames_from_quaternions(columns["quaternion"], mounting)
+    elif {"time", "rotation_rate", "acceleration", "magnetic"} <= columns.keys():
+        vectors = columns["rotation_rate"], columns["acceleration"], columns["magnetic"]
+        frames = frames_from_imu(columns["time"], *vectors, mounting)
     elif {"acceleration", "magnetic"} <= columns.keys():
         reference = ReferenceField(device.reference.acceleration, device.reference.magnetic)
         frames = frames_from_vectors(columns["acceleration"], columns["magnetic"], reference, mounting)
