@@ -139,11 +139,17 @@ def test_a_file_is_opened_edited_and_reconstructed_with_other_parameters(
     curves.get_by_role("button", name="Undo").click()
     expect(nodes).to_have_count(11)
 
+    page.get_by_text("Parameters").click()
+    page.get_by_role("slider", name="Step").fill("0.4")
+    expect(page.get_by_title("Smooths over this length by resisting change of curvature")).to_contain_text(
+        re.compile(r"\d (mm|cm|m)")
+    )
+    page.get_by_role("button", name="Back to automatic").click()
+
     page.get_by_role("button", name="Reconstruct").click()
     view = page.locator("canvas")
     expect(view).to_have_attribute("data-surface", "shown")
     coarse = int(view.get_attribute("data-triangles") or 0)
-    page.get_by_text("Parameters").click()
     page.get_by_role("slider", name="Step").fill("0.3")
     expect(page.get_by_text("Parameters (changed)")).to_be_visible()
     expect(view).not_to_have_attribute("data-triangles", str(coarse))

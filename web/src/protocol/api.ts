@@ -1,4 +1,14 @@
-import type { Curve, CurveUpdate, Problem, Reconstruction, ReconstructionParameters, RecordingSummary, Session } from "../wire.gen";
+import type {
+  Curve,
+  CurveUpdate,
+  NodeProposals,
+  Preview,
+  Problem,
+  Reconstruction,
+  ReconstructionParameters,
+  RecordingSummary,
+  Session,
+} from "../wire.gen";
 
 /** An answer of the server that is not a success, in its own words. */
 export class ApiProblem extends Error {
@@ -64,6 +74,15 @@ export class Api {
 
   reconstruct(session: string, parameters: Partial<ReconstructionParameters>): Promise<Reconstruction> {
     return this.#json<Reconstruction>("POST", `/sessions/${session}/reconstructions`, JSON.stringify(parameters));
+  }
+
+  /** The network with these parameters, at once; refused (409) when the same client asked again meanwhile. */
+  preview(session: string, client: string, parameters: Partial<ReconstructionParameters>): Promise<Preview> {
+    return this.#json<Preview>("POST", `/sessions/${session}/preview?client=${client}`, JSON.stringify(parameters));
+  }
+
+  proposals(session: string): Promise<NodeProposals> {
+    return this.#json<NodeProposals>("GET", `/sessions/${session}/node-proposals`);
   }
 
   reconstruction(id: string): Promise<Reconstruction> {

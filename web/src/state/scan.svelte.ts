@@ -5,6 +5,7 @@ import { DurableSpool, type RecordingState } from "../protocol/spool";
 import { Uplink } from "../protocol/uplink";
 import type { Hello } from "../wire.gen";
 import { mergedNumbers, Network } from "./network";
+import { newName } from "./names";
 import { freshRecording, Recorder } from "./recorder";
 import { inWords } from "./session.svelte";
 
@@ -206,9 +207,4 @@ export class ScanStore {
     this.nodes = mergedNumbers(this.nodes, this.network.nodes.keys());
     this.revision += 1;
   }
-}
-
-function newName(kind: string): string {
-  const bytes = crypto.getRandomValues(new Uint8Array(8));
-  return `${kind}-${[...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
 }

@@ -13,7 +13,9 @@ import type {
 } from "../wire.gen";
 import { History } from "./history.svelte";
 import { Network } from "./network";
-import { loadResult, type Result } from "./result";
+import { newName } from "./names";
+import { Latest } from "./latest";
+import { loadResult, type Report, type Result } from "./result";
 
 /** A curve as the list of curves names it. */
 export interface CurveEntry {
@@ -42,6 +44,8 @@ export class SessionStore {
   nodes = $state.raw<readonly number[]>([]);
   reconstruction = $state.raw<Reconstruction>();
   result = $state.raw<Result>();
+  /** The network with parameters that a hand is moving. */
+  preview = $state.raw<{ readonly network: Network; readonly report: Report }>();
   recordings = $state.raw<readonly RecordingSummary[]>([]);
   problem = $state("");
   /** Counts changes of the drawn network. */
@@ -51,6 +55,8 @@ export class SessionStore {
   #socket: LiveSocket | undefined;
   /** The newest reconstruction whose results were asked for: none is shown twice, none after a newer one. */
   #loading: string | undefined;
+  readonly #client = newName("page");
+  readonly #previews = new Latest((parameters: Partial<ReconstructionParameters>) => this.#try(parameters));
   #listTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
@@ -63,9 +69,10 @@ export class SessionStore {
     return this.curves.some((curve) => !curve.ended);
   }
 
-  /** What is drawn: the reconstructed network once there is one and nothing was scanned since, else the live one. */
+  /** What is drawn: the preview while parameters are moved, else the reconstructed network once there is one and
+   * nothing was scanned since, else the live one. */
   get network(): Network {
-    return this.result?.network ?? this.live;
+    return this.preview?.network ?? this.result?.network ?? this.live;
   }
 
   async open(): Promise<void> {
@@ -113,6 +120,11 @@ export class SessionStore {
     const before = this.reconstruction;
     await this.#command(async () => this.#progressed(await this.api.reconstruct(this.id, parameters)));
     if (before && isBusy(before)) await this.api.cancel(before.id).catch(() => undefined);
+  }
+
+  /** Draw the network with these parameters as soon as it can be had; only the newest wish counts. */
+  tryOut(parameters: Partial<ReconstructionParameters>): void {
+    void this.#previews.want(parameters);
   }
 
   async cancel(): Promise<void> {
@@ -190,13 +202,24 @@ export class SessionStore {
     const result = await loadResult(this.api, reconstruction);
     if (this.#loading !== reconstruction.id) return;
     this.result = result;
+    this.preview = undefined;
     this.#redraw();
+  }
+
+  async #try(parameters: Partial<ReconstructionParameters>): Promise<void> {
+    await this.#command(async () => {
+      const { curves, nodes, report } = await this.api.preview(this.id, this.#client, parameters);
+      const network = new Network();
+      network.apply({ type: "live.network", curves, nodes });
+      this.preview = { network, report: { network: report } };
+      this.#redraw();
+    });
   }
 
   /** Points were scanned that no result has: show what is live. */
   #outdate(): void {
-    if (!this.result) return;
-    this.result = undefined;
+    if (!this.result && !this.preview) return;
+    this.result = this.preview = undefined;
     this.#redraw();
   }
 
