@@ -72,6 +72,15 @@ def test_the_virtual_operator_scans_a_whole_shape(bench):
     assert all(is_slice(bench.server.frames(c), bench.sent()) for c in range(len(cone().curves)))
 
 
+def test_a_few_samples_do_not_wait_for_more(bench, eventually):
+    device = bench.virtual()
+    bridge = bench.bridge("--rate", "20")
+    record_a_curve(bench, bridge, 4)
+    device.stop(signal.SIGKILL)
+    bridge.says("device: lost")
+    eventually(lambda: bench.server.stored and bench.server.frames(0)[-1:] == bench.sent()[-1:])
+
+
 @pytest.mark.parametrize("server_is_there", [True, False])
 def test_killed_in_mid_curve_it_goes_on_with_the_curve(bench, server_is_there):
     bench.server.silent = not server_is_there

@@ -97,6 +97,23 @@ def test_a_segment_begins_where_a_restart_can_go_on(tmp_path):
     assert from_device.validate_json(recording[0]) == HELLO
 
 
+def test_what_the_disk_does_not_make_durable_may_not_be_sent(tmp_path, monkeypatch):
+    spool = Spool(tmp_path, HELLO)
+    spool.append(message(0))
+
+    def fail(_):
+        raise OSError("the disk is gone")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(os, "fsync", fail)
+        with pytest.raises(OSError, match="the disk is gone"):
+            spool.sync()
+    assert read(spool, 0) == []
+    spool.sync()
+    assert read(spool, 0) == [message(0)]
+    spool.close()
+
+
 def test_something_else_among_the_messages_is_not_guessed_at(tmp_path):
     spool = Spool(tmp_path, HELLO)
     for seq in range(3):
