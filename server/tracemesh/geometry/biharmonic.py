@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tracemesh.geometry.factorisation import factorised
+from tracemesh.geometry.factorisation import Factorisation
 from tracemesh.geometry.laplacian import Laplacian
 from tracemesh.geometry.network import Floats
 
@@ -26,7 +26,7 @@ class BiharmonicSolver:
         self._gradient = (laplacian.stiffness[fixed:] @ sparse.diags(weight)).tocsr()
         matrix = (self._gradient @ laplacian.stiffness).tocsc()
         self._coupling = matrix[:, :fixed]
-        self._factor = factorised(matrix[:, fixed:])
+        self._factor = Factorisation(matrix[:, fixed:])
 
     def solve(self, known: Floats, laplacian_target: Floats | None = None) -> Floats:
         """(n, m) values with L V near a target.

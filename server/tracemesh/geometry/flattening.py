@@ -9,7 +9,7 @@ normal cannot give where the patch is steep. All patches are unrolled by one fac
 import numpy as np
 from scipy import sparse
 
-from tracemesh.geometry.factorisation import factorised
+from tracemesh.geometry.factorisation import Factorisation
 from tracemesh.geometry.laplacian import cotangent_weights
 from tracemesh.geometry.network import Floats, Ints
 
@@ -28,7 +28,7 @@ def flatten(vertices: Floats, faces: Ints, planar: Floats, pinned: Ints) -> Floa
     wanted = _opposite(_isometric(corners))
     free = np.setdiff1d(np.arange(len(vertices)), pinned)
     matrix = _stiffness(faces, weights, len(vertices))[free]
-    factor = factorised(matrix[:, free])
+    factor = Factorisation(matrix[:, free])
     position = planar[:, 0] + 1j * planar[:, 1]
     for _ in range(STEPS):
         turn = (weights * _opposite(position[faces]) * wanted.conj()).sum(1)

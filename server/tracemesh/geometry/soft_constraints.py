@@ -12,7 +12,7 @@ from scipy import sparse
 
 from tracemesh.geometry.curvature import mean_curvature
 from tracemesh.geometry.edges import boundary_vertices
-from tracemesh.geometry.factorisation import factorised
+from tracemesh.geometry.factorisation import Factorisation
 from tracemesh.geometry.laplacian import Laplacian
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints
 
@@ -31,7 +31,7 @@ def softened_points(
     curvature = (-2 * mean_curvature(vertices, faces, normals) * laplacian.mass)[:, None] * normals
     matrix = laplacian.stiffness @ weight @ laplacian.stiffness + sparse.diags(data)
     right = laplacian.stiffness @ (weight @ curvature) + data[:, None] * vertices
-    factor = factorised(matrix)
+    factor = Factorisation(matrix)
     return np.asarray(factor.solve(right)[: len(network.points)])
 
 
