@@ -221,6 +221,7 @@ def _curve(raw: _RawCurve, device: Device) -> CurveScan:
     scan = CurveScan(
         distance, tangent, normal, samples, ids, raw.boundary, raw.closed,
         columns.get("acceleration"), columns.get("magnetic"), columns.get("time"),
+        timed=columns.keys().isdisjoint({"distance", "ticks"}),
     )  # fmt: skip
     return from_first_node(scan) if raw.closed else scan
 

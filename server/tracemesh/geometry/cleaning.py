@@ -37,6 +37,7 @@ class CleanCurve:
     nodes: Ints
     closed: bool
     boundary: bool
+    timed: bool
     index: int
     samples: int
     dropped: int
@@ -183,6 +184,7 @@ def clean_curve(curve: CurveScan, index: int) -> CleanCurve:
         curve.node_ids,
         curve.closed,
         curve.boundary,
+        curve.timed,
         index,
         len(bad),
         int(bad.sum()),

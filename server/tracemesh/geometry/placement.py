@@ -35,6 +35,7 @@ class PlacedCurve:
     nodes: Ints
     closed: bool
     boundary: bool
+    timed: bool
     index: int
 
     @property
@@ -90,6 +91,7 @@ def _cut(
         nodes,
         curve.closed,
         curve.boundary,
+        curve.timed,
         curve.index,
     )
 

@@ -59,16 +59,20 @@ def _tangents(curves: Sequence[PlacedCurve], layout: Layout) -> tuple[Floats, Fl
     return np.concatenate(chord), np.concatenate(smooth)
 
 
+def measured_edges(curves: Sequence[PlacedCurve], layout: Layout) -> tuple[Floats, Floats]:
+    """Edge vectors (e, 3), m, of a measured layout if tangents are chords to the next sample, and if they are not."""
+    chord, smooth = _tangents(curves, layout)
+    rows, h = layout.edges, layout.lengths[:, None]
+    return h * chord[rows], h * (smooth[rows] + smooth[rows + 1]) / 2
+
+
 def _residual(positions: Positions) -> float:
     return float(np.sqrt(np.mean(np.sum(positions.gaps**2, axis=1))))
 
 
 def measure_network(curves: Sequence[PlacedCurve], layout: Layout) -> MeasuredNetwork:
     """Positions of connected curves at the rows of their measured layout, under the convention that closes better."""
-    chord, smooth = _tangents(curves, layout)
-    rows, h = layout.edges, layout.lengths[:, None]
-    chords = solve_positions(layout, h * chord[rows])
-    curved = solve_positions(layout, h * (smooth[rows] + smooth[rows + 1]) / 2)
+    chords, curved = (solve_positions(layout, edges) for edges in measured_edges(curves, layout))
     residuals = _residual(chords), _residual(curved)
     floor = _SMALLEST * float(layout.lengths.sum())
     is_polyline = residuals[1] > floor and residuals[0] * _FACTOR < residuals[1]

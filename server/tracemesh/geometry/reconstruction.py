@@ -23,6 +23,7 @@ from tracemesh.geometry.regression import Regression, RegressionSolver
 from tracemesh.geometry.resampling import resample
 from tracemesh.geometry.samples import Layout, NetworkSamples
 from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.sketch import with_lengths
 from tracemesh.geometry.uncertainty import point_uncertainty
 from tracemesh.geometry.weights import choose_weights
 
@@ -102,7 +103,10 @@ class NetworkReconstruction:
         curves = tuple(place_curve(curve) for curve in self._cleaned)
         self._indices = np.array([c.index for c in curves])
         self._stages.begin("measuring")
-        self._measured = self._measure(curves)
+        check_connected(measured_layout(curves), self._indices)
+        curves = with_lengths(curves)
+        self._measured = measure_network(curves, measured_layout(curves))
+        _check_closed(curves, self._measured)
         self._step = _step(self._parameters, curves, self._measured)
         self._stages.begin("resampling")
         samples = resample(curves, uniform_layout(curves, self._step), self._step)
@@ -114,13 +118,6 @@ class NetworkReconstruction:
         self._start = self._closed.start if self._closed else self._choice.frames
         self._solver = RegressionSolver(self._samples.layout)
         self._stages.end()
-
-    def _measure(self, curves: Sequence[PlacedCurve]) -> MeasuredNetwork:
-        layout = measured_layout(curves)
-        check_connected(layout, self._indices)
-        measured = measure_network(curves, layout)
-        _check_closed(curves, measured)
-        return measured
 
     def _close(self, curves: Sequence[PlacedCurve], samples: NetworkSamples) -> Closed | None:
         """The network freed from errors of whole curves; None for a polyline, which is exact as it is."""

@@ -26,6 +26,7 @@ class CurveScan:
     closed: the curve ends where it began.
     acceleration, magnetic: (n, 3) or None, the raw vectors in the device's frame, any unit; used to judge quality.
     time: (n,) s or None, device clock.
+    timed: the distance was made from durations; between two nodes it is right up to a factor that is not known.
     """
 
     distance: Floats
@@ -38,6 +39,7 @@ class CurveScan:
     acceleration: Floats | None = None
     magnetic: Floats | None = None
     time: Floats | None = None
+    timed: bool = False
 
 
 @dataclass(frozen=True)
