@@ -51,6 +51,7 @@ def test_pages_of_sessions_are_the_whole_list(start_server: Any) -> None:
         ("POST", "/sessions", {"id": "../etc"}, 422),
         ("POST", "/sessions", {"nmae": "typo"}, 422),
         ("POST", "/sessions", {"name": 7}, 422),
+        ("POST", "/sessions", {"name": "no\x00name"}, 422),
         ("GET", "/sessions?limit=0", None, 422),
         ("GET", "/sessions?after=none", None, 404),
         ("GET", "/sessions/none/curves/99999999999999999999", None, 422),

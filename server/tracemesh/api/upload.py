@@ -14,6 +14,12 @@ CHUNK = 500
 """Messages between two waits for the disk."""
 
 
+def file_body(*media_types: str) -> dict[str, object]:
+    """What OpenAPI is told of a route whose body is a file as it is."""
+    content = {media_type: {"schema": {"type": "string", "format": "binary"}} for media_type in media_types}
+    return {"requestBody": {"required": True, "content": content}}
+
+
 @dataclass(frozen=True)
 class Upload:
     """A recording and its messages, read and byte for byte."""

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from tracemesh.errors import Cancelled, TracemeshError
 from tracemesh.storage.artifacts import ArtifactStore
 from tracemesh.storage.database import Database
-from tracemesh.storage.models import ReconstructionRow
-from tracemesh.storage.reconstructions import finish, report_progress
+from tracemesh.storage.reconstructions import finish, get_reconstruction, report_progress
 from tracemesh.storage.scans import load_scan
-from tracemesh.wire.resources import JobState, ReconstructionParameters
+from tracemesh.wire.resources import JobState
 
 if TYPE_CHECKING:
     from tracemesh.pipeline import Reconstruction
@@ -48,10 +47,9 @@ class _Attempt:
         from tracemesh.pipeline import reconstruct
 
         with self._database.read() as transaction:
-            row = transaction.get_one(ReconstructionRow, self._identifier)
-            parameters = ReconstructionParameters.model_validate(row.parameters)
-            scan, _ = load_scan(transaction, row.session_id)
-        result = reconstruct(scan, parameters, self._progress)
+            wanted = get_reconstruction(transaction, self._identifier)
+            scan, _ = load_scan(transaction, wanted.session)
+        result = reconstruct(scan, wanted.parameters, self._progress)
         artifacts = {name: (self._store.put(content), len(content)) for name, content in _files(result).items()}
         with self._database.write() as transaction:
             finish(transaction, self._identifier, self._attempt, "done", artifacts=artifacts)

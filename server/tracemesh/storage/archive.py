@@ -19,7 +19,7 @@ from tracemesh.storage.curves import marks_of, replace_marks
 from tracemesh.storage.models import ArtifactRow, CurveRow, ReconstructionRow, RecordingRow, new_id
 from tracemesh.storage.recordings import recording_messages
 from tracemesh.storage.sessions import session_row
-from tracemesh.wire.base import Count, Identifier, Message
+from tracemesh.wire.base import Count, Identifier, Message, Name
 from tracemesh.wire.resources import Mark, ReconstructionParameters
 
 MANIFEST = "session.json"
@@ -51,7 +51,7 @@ class Manifest(Message):
 
     format: Literal["tracemesh-session"] = "tracemesh-session"
     version: Literal[1] = 1
-    name: str = Field(max_length=200)
+    name: Name
     curves: list[ArchivedCurve]
     reconstructions: list[ArchivedReconstruction]
     files: dict[str, str] = Field(description="path -> SHA-256 of the content")

@@ -14,6 +14,9 @@ Count = Annotated[int, Field(ge=0, le=2**53 - 1)]
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 """Chosen by whoever creates the thing; safe in a URL and in a file name."""
 
+Name = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+"""For people: one line of text."""
+
 
 class Message(BaseModel):
     """A frozen message that refuses fields it does not know and numbers that are not finite."""

@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, TypeAdapter, model_validator
 
-from tracemesh.wire.base import PROTOCOL_VERSION, Count, Identifier, Message, Quaternion, Vector
+from tracemesh.wire.base import PROTOCOL_VERSION, Count, Identifier, Message, Name, Quaternion, Vector
 
 MAX_SAMPLES = 2000
 """Most samples that one message may carry."""
@@ -40,7 +40,7 @@ class Device(Message):
 
     id: Identifier
     kind: Identifier = Field(description="morphorider, phone, sensorserver, file, ...")
-    name: str = Field(default="", max_length=200)
+    name: Name = ""
     wheel: Wheel | None = Field(default=None, description="present when the device counts wheel ticks")
     mounting: Quaternion = Field(
         default=(1.0, 0.0, 0.0, 0.0),

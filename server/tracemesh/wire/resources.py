@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from tracemesh.wire.base import Count, Identifier, Message, Vector
+from tracemesh.wire.base import Count, Identifier, Message, Name, Vector
 from tracemesh.wire.device import Device
 
 
@@ -13,13 +13,13 @@ class SessionCreate(Message):
     """POST /sessions."""
 
     id: Identifier | None = Field(default=None, description="chosen by the caller; none: the server chooses")
-    name: str = Field(default="", max_length=200)
+    name: Name = ""
 
 
 class SessionUpdate(Message):
     """PATCH /sessions/{session}; absent fields stay."""
 
-    name: str | None = Field(default=None, max_length=200)
+    name: Name | None = None
 
 
 class Session(Message):

@@ -10,7 +10,7 @@ from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
 from tracemesh.api.services import Services, UseServices
-from tracemesh.api.upload import parse_upload, store_upload
+from tracemesh.api.upload import file_body, parse_upload, store_upload
 from tracemesh.errors import InputError
 from tracemesh.storage.archive import Manifest, read_archive, restore, write_archive
 from tracemesh.storage.sessions import create_session, get_session
@@ -33,7 +33,7 @@ def export(session: Identifier, services: UseServices) -> StreamingResponse:
     return StreamingResponse(_chunks(file), headers=headers, media_type="application/zip")
 
 
-@router.post("/archive", status_code=201)
+@router.post("/archive", status_code=201, openapi_extra=file_body("application/zip"))
 async def restore_session(request: Request, services: UseServices, response: Response) -> Session:
     """A new session from an archive: whole, or not at all."""
     with tempfile.SpooledTemporaryFile(SPOOLED) as file:

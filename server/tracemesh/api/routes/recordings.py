@@ -7,7 +7,7 @@ from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
 from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
-from tracemesh.api.upload import parse_upload, store_upload
+from tracemesh.api.upload import file_body, parse_upload, store_upload
 from tracemesh.errors import InputError
 from tracemesh.storage import recordings
 from tracemesh.storage.models import derived_id, new_id
@@ -33,7 +33,7 @@ def export(session: Identifier, recording: Identifier, services: UseServices) ->
     return StreamingResponse(_lines(services, row.key, row.hello), headers=headers, media_type="application/x-ndjson")
 
 
-@router.post("", status_code=201)
+@router.post("", status_code=201, openapi_extra=file_body("text/plain", "application/x-ndjson"))
 async def upload(
     session: Identifier,
     request: Request,
