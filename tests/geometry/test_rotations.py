@@ -11,7 +11,6 @@ from tracemesh.geometry.rotations import (
     darboux_frames,
     exp,
     hat,
-    left_jacobian,
     log,
     matrix_to_quaternion,
     quaternion_difference,
@@ -36,14 +35,6 @@ def test_log_undoes_exp(size: float) -> None:
 @pytest.mark.parametrize("size", SIZES)
 def test_exp_is_scipys(size: float) -> None:
     np.testing.assert_allclose(exp(vectors(size)), Rotation.from_rotvec(vectors(size)).as_matrix(), atol=1e-15)
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_left_jacobian_is_the_mean_rotation(size: float) -> None:
-    nodes, weights = np.polynomial.legendre.leggauss(20)
-    v = vectors(size, 5)
-    mean = sum(w / 2 * exp((x + 1) / 2 * v) for x, w in zip(nodes, weights, strict=True))
-    np.testing.assert_allclose(left_jacobian(v), mean, atol=1e-14)
 
 
 @settings(max_examples=50, deadline=None)

@@ -12,7 +12,7 @@ from tracemesh.geometry.rotations import exp, matrix_to_quaternion, quaternion_p
 
 Floats = NDArray[np.float64]
 
-_CLOSEST = 0.5  # of the distance between two marks that shifts must leave
+_CLOSEST = 0.5  # of the distance between two marks that corrections must leave
 
 
 def _allowed(marks: Floats, shift: Floats) -> Floats:
@@ -22,7 +22,7 @@ def _allowed(marks: Floats, shift: Floats) -> Floats:
 
 
 def _corrected(curve: PlacedCurve, rotation: Floats, scale: float, shift: Floats) -> PlacedCurve:
-    shift = _allowed(curve.marks, shift)
+    shift, scale = _allowed(curve.marks, shift), max(scale, -_CLOSEST)
     marks = (1 + scale) * (curve.marks + shift - shift[0])
     arc = (1 + scale) * (curve.arc - shift[0])
     turn = exp(rotation)

@@ -27,22 +27,14 @@ def skew_vector(matrix: Floats) -> Floats:
     return np.stack(columns, axis=-1)
 
 
-def _rodrigues(angle: Floats) -> tuple[Floats, Floats, Floats]:
-    """sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 for angles (...)."""
-    small = angle < _SMALL
-    a = np.where(small, 1.0, angle)
-    square = angle * angle
-    first = np.where(small, 1 - square / 6, np.sin(a) / a)
-    second = np.where(small, 0.5 - square / 24, 2 * (np.sin(a / 2) / a) ** 2)
-    third = np.where(small, 1 / 6 - square / 120, (a - np.sin(a)) / a**3)
-    return first, second, third
-
-
 def exp(vector: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
-    first, second, _ = _rodrigues(np.linalg.norm(vector, axis=-1))
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    a = np.where(angle < _SMALL, 1.0, angle)
+    first = np.where(angle < _SMALL, 1 - angle**2 / 6, np.sin(a) / a)
+    second = np.where(angle < _SMALL, 0.5 - angle**2 / 24, 2 * (np.sin(a / 2) / a) ** 2)
     cross = hat(vector)
-    result: Floats = np.eye(3) + first[..., None, None] * cross + second[..., None, None] * (cross @ cross)
+    result: Floats = np.eye(3) + first * cross + second * (cross @ cross)
     return result
 
 
@@ -54,14 +46,6 @@ def log(matrix: Floats) -> Floats:
     half = np.arctan2(sine, q[..., 0])
     factor = np.where(sine < _SMALL, 2 / np.maximum(q[..., 0], 0.5), 2 * half / np.maximum(sine, _SMALL))
     result: Floats = factor[..., None] * q[..., 1:]
-    return result
-
-
-def left_jacobian(vector: Floats) -> Floats:
-    """J_l(v) (..., 3, 3), the mean of exp(s v) over s in [0, 1]."""
-    _, second, third = _rodrigues(np.linalg.norm(vector, axis=-1))
-    cross = hat(vector)
-    result: Floats = np.eye(3) + second[..., None, None] * cross + third[..., None, None] * (cross @ cross)
     return result
 
 
