@@ -9,19 +9,21 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from tracemesh.errors import TracemeshError
+from tracemesh.errors import InputError, TracemeshError
 from tracemesh.files import read_bytes, read_text, write_all
 from tracemesh.terminal import ProgressLine
 from tracemesh.wire.resources import ReconstructionParameters
 
 if TYPE_CHECKING:
     from tracemesh.geometry.node_inference import InferredNodes
+    from tracemesh.geometry.orientation import ReferenceField
     from tracemesh.pipeline import Reconstruction
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -77,6 +79,16 @@ def _add_reconstruct(commands: Commands) -> None:
     parser.add_argument("--weights", choices=("auto", "thesis"), default="auto", help="smoothing (default auto)")
     parser.add_argument(
         "--curve-bias", choices=("auto", "on", "off"), default="auto", help="fit heading and scale per curve (auto)"
+    )
+    field = parser.add_mutually_exclusive_group()
+    field.add_argument(
+        "--place", type=_place, metavar="LAT,LON", help="degrees; the magnetic field there (--place=-33.9,151.2)"
+    )
+    field.add_argument(
+        "--still", metavar="STILL.ndjson", help="the field that a recording of the device at rest measured"
+    )
+    parser.add_argument(
+        "--date", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of the scan, with --place (default today)"
     )
     parser.add_argument("--infer-nodes", action="store_true", help="find the nodes that are not marked")
     parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
@@ -178,6 +190,11 @@ def _mesh_path(text: str) -> Path:
     return path
 
 
+def _place(text: str) -> tuple[float, float]:
+    latitude, _, longitude = text.partition(",")
+    return float(latitude), float(longitude)
+
+
 def _reconstruct(chosen: argparse.Namespace) -> int:
     from tracemesh.formats.scans import read_scan
     from tracemesh.pipeline import reconstruct
@@ -192,13 +209,29 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
         soft=chosen.soft,
         surface=not chosen.no_surface,
     )
-    scan = read_scan(read_text(chosen.input), chosen.input)
+    scan = read_scan(read_text(chosen.input), chosen.input, _field(chosen))
     with ProgressLine() as progress:
         result = reconstruct(scan, parameters, progress)
     if result.nodes:
         print(f"tracemesh: {_nodes_in_words(result.nodes)}", file=sys.stderr)
     _write_results(chosen, result)
     return 0
+
+
+def _field(chosen: argparse.Namespace) -> ReferenceField | None:
+    """The magnetic field that the person names, if any."""
+    from tracemesh.formats.recordings import read_recording
+    from tracemesh.formats.references import measured_reference
+    from tracemesh.geometry.magnetic_field import field_at
+
+    if chosen.date and not chosen.place:
+        raise InputError("--date says when the field of a --place is wanted, but there is no --place")
+    if chosen.place:
+        latitude, longitude = chosen.place
+        return field_at(latitude, longitude, chosen.date or date.today())
+    if chosen.still:
+        return measured_reference(read_recording(read_text(chosen.still).split("\n"), chosen.still))
+    return None
 
 
 def _nodes_in_words(nodes: InferredNodes) -> str:

@@ -99,7 +99,7 @@ def test_a_gyroscope_is_fused_with_the_vectors() -> None:
     columns = {
         "time": (np.arange(count) / 60).tolist(),
         "rotation_rate": np.tile([0.0, 0.0, 60 / (count - 1)], (count, 1)).tolist(),
-        "acceleration": turn.inv().apply(shake + [0.0, 0.0, 9.81]).tolist(),
+        "acceleration": turn.inv().apply(np.add(shake, [0.0, 0.0, 9.81])).tolist(),
         "magnetic": turn.inv().apply([0.0, 22.0, -42.0]).tolist(),
     }
     errors = []

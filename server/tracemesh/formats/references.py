@@ -1,0 +1,38 @@
+"""Recordings and the field that their vectors are compared with."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tracemesh.errors import InputError
+from tracemesh.formats.recordings import Recording
+from tracemesh.geometry.magnetic_field import field_at_rest
+from tracemesh.geometry.orientation import ReferenceField
+from tracemesh.wire.device import Reference, Samples
+
+
+def with_reference(recording: Recording, field: ReferenceField) -> Recording:
+    """The recording as if made in this field; raises InputError where that makes no difference to any curve."""
+    if not any(_needs_reference(m) for m in recording.messages if isinstance(m, Samples)):
+        raise InputError(
+            f"recording {recording.hello.recording}: its orientations do not depend on the magnetic field of a place: "
+            "wanted acceleration and magnetic without rotation_rate"
+        )
+    reference = Reference(acceleration=field.acceleration, magnetic=field.magnetic)
+    device = recording.hello.device.model_copy(update={"reference": reference})
+    return replace(recording, hello=recording.hello.model_copy(update={"device": device}))
+
+
+def measured_reference(recording: Recording) -> ReferenceField:
+    """The field by a device at rest; raises InputError where its recording has no vectors, ScanError if it moved."""
+    blocks = [m for m in recording.messages if isinstance(m, Samples) and m.acceleration and m.magnetic]
+    if not blocks:
+        raise InputError(f"recording {recording.hello.recording}: wanted samples with acceleration and magnetic")
+    acceleration = np.concatenate([np.array(block.acceleration, float) for block in blocks])
+    magnetic = np.concatenate([np.array(block.magnetic, float) for block in blocks])
+    return field_at_rest(acceleration, magnetic)
+
+
+def _needs_reference(block: Samples) -> bool:
+    others = (block.quaternion, block.tangent and block.normal, block.rotation_rate and block.time)
+    return all(other is None for other in others)
