@@ -55,7 +55,7 @@ def triangulate_patches(
     whose patches are unrolled to be triangulated again; None projects along average normals.
     """
     fixed = count = len(complex_.network.points)
-    outlines = _outlines(complex_)
+    outlines = outlines_of(complex_)
     count = max(count, 1 + max(int(outline.vertex.max()) for outline in outlines))
     unrolled = None if last is None else _unrolled_loops(outlines, *last)
     planar, faces, vertex, patch, starts, lift = [], [], [], [], [], [np.zeros((count, 3))]
@@ -95,7 +95,7 @@ def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool
     return bool((in_space >= enough).all()) and not inverted_faces(vertices, patches.faces, normals).any()
 
 
-def _outlines(complex_: CellComplex) -> list[Outline]:
+def outlines_of(complex_: CellComplex) -> list[Outline]:
     """Outline of every face; a face with two loops counts as the first of them."""
     network, outlines = complex_.network, []
     next_vertex = len(network.points)
