@@ -6,7 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from time import perf_counter
 
-from benchmarks import accuracy, growth, lengths, nodes, noisy, regression, surfacing, times
+from benchmarks import accuracy, growth, ingest, lengths, nodes, noisy, regression, surfacing, times
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
 from benchmarks.report import read_report, record, write_report
@@ -25,6 +25,7 @@ TABLES: dict[str, Callable[[Data], Table]] = {
     "times": times.times,
     "regression": regression.regression,
     "growth": growth.growth,
+    "ingest": ingest.ingest,
 }
 
 
