@@ -27,6 +27,7 @@ check: setup  ## formatting, lint, types, import rules
 	$(BIN)/lint-imports --no-cache
 	cd web && npm run check
 
+bench: export OPENBLAS_NUM_THREADS = 1
 bench: setup .make/bench  ## measure and write docs/benchmarks.md
 	$(BIN)/python -m benchmarks
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Generic, TypeVar
 
 Result = TypeVar("Result")
@@ -15,8 +15,8 @@ _STATUS = Path("/proc/self/status")
 
 @dataclass(frozen=True)
 class Measured(Generic[Result]):
-    """result: what the work returned. seconds: it took, imports not counted. memory: bytes above what imports took, or
-    None where the system does not tell.
+    """result: what the work returned. seconds: processor time, imports not counted. memory: bytes above what imports
+    took, or None where the system does not tell.
     """
 
     result: Result
@@ -41,9 +41,9 @@ def apart(budget: float, work: Callable[..., Result], *args: object) -> Measured
 
 
 def _report(pipe: Connection, work: Callable[..., object], args: tuple[object, ...]) -> None:
-    before, begin = _peak(), perf_counter()
+    before, begin = _peak(), process_time()
     result = work(*args)
-    seconds, after = perf_counter() - begin, _peak()
+    seconds, after = process_time() - begin, _peak()
     pipe.send(Measured(result, seconds, None if before is None or after is None else after - before))
 
 

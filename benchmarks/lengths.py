@@ -18,10 +18,11 @@ from tracemesh.geometry.simulation import plan_scan, simulate_scan
 from tracemesh.wire.device import Samples
 
 NOTE = """Mean distance of the network's points to the true curves, % of the diagonal, after rigid registration; the
-    same simulated noisy scans (constant speed but for pauses at nodes) with three sources of distance. Wheel: ticks.
-    Measured lengths: time, scaled to the true length of every segment. Time alone: the network is scaled to the true
-    total length, as the thesis does. The thesis reports, of a real lilium: about 1 % with the wheel and with measured
-    lengths, about 2 % with time alone."""
+    same simulated noisy scans with several sources of distance. Wheel: ticks. Measured lengths: time, scaled to the
+    true length of every segment. Constant speed: time, as the simulated hand moved but for ramps and pauses. Unknown
+    speeds: durations, each segment's speed being unknown (the default where there is only time). The last two are
+    scaled to the true total length, as the thesis does. The thesis reports, of a real lilium: about 1 % with the wheel
+    and with measured lengths, about 2 % with constant speed."""
 
 
 def lengths(data: Data, names: tuple[str, ...] = tuple(SHAPES)) -> Table:
@@ -29,7 +30,7 @@ def lengths(data: Data, names: tuple[str, ...] = tuple(SHAPES)) -> Table:
     del data  # only simulated scans tell time
     columns = (
         Column("noisy scan"),
-        *(Column(name, ".3f") for name in ("wheel", "time, measured lengths", "time alone")),
+        *(Column(name, ".3f") for name in ("wheel", "measured lengths", "constant speed", "unknown speeds")),
     )
     return Table("lengths", "Where distance comes from", columns, tuple(map(_row, names)), (NOTE,))
 
@@ -49,9 +50,10 @@ def _row(name: str) -> tuple[Cell, ...]:
     shape = built_in(name)
     recording = recording_from_simulation(simulate_scan(plan_scan(shape, seed=1), 1), name)
     timed = scan_from_recordings([without_wheel(recording)])
-    scans = (scan_from_recordings([recording]), with_lengths(timed, shape.curves), timed)
+    measured, constant = with_lengths(timed, shape.curves), Scan(tuple(replace(c, timed=False) for c in timed.curves))
+    scans = (scan_from_recordings([recording]), measured, constant, timed)
     networks = [reconstruct_network(scan).network for scan in scans]
-    networks[2] = _scaled(networks[2], shape)
+    networks[2:] = [_scaled(network, shape) for network in networks[2:]]
     truth = exact_network(shape)
     errors = [network_error(network, CurveTruth.of(truth), truth.diagonal).mean for network in networks]
     return (f"{name} (built in)", *errors)
@@ -59,7 +61,7 @@ def _row(name: str) -> tuple[Cell, ...]:
 
 def _stretched(curve: CurveScan, known: ShapeCurve) -> CurveScan:
     marked = curve.distance[curve.node_samples]
-    return replace(curve, distance=np.interp(curve.distance, marked, known.node_positions))
+    return replace(curve, distance=np.interp(curve.distance, marked, known.node_positions), timed=False)
 
 
 def _scaled(network: CurveNetwork, shape: Shape) -> CurveNetwork:

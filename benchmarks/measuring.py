@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import exp, log
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,14 @@ Ints = NDArray[np.int64]
 
 
 def warm_seconds(work: Callable[[], object], repeats: int = 7, limit: float = 10.0) -> float:
-    """Shortest time of some calls, after one that does not count; no further call is begun after `limit` seconds."""
+    """Least processor time of some calls, after one that does not count; none is begun after `limit` seconds."""
     start = perf_counter()
     work()
     times: list[float] = []
     while not times or (len(times) < repeats and perf_counter() - start < limit):
-        begin = perf_counter()
+        begin = process_time()
         work()
-        times.append(perf_counter() - begin)
+        times.append(process_time() - begin)
     return min(times)
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import combinations
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -115,9 +115,9 @@ def _way(curve: CurveScan, a: float, b: float) -> float:
 
 def _inferred(known: KnownScan) -> Result:
     bare = without_marks(known.scan)
-    begin = perf_counter()
+    begin = process_time()
     inferred = infer_nodes(bare)
-    seconds = perf_counter() - begin
+    seconds = process_time() - begin
     true, proposed = marked_meetings(known.scan), proposed_meetings(known.scan, inferred)
     return Result(known.name, len(true), len(proposed), match_errors(known.scan, true, proposed), seconds)
 

@@ -25,7 +25,8 @@ HEAD = """# Benchmarks
 
 Written by `make bench` (`python -m benchmarks`; with the names of tables it measures these alone and keeps the others);
 the same figures unrounded are in [benchmarks.json](benchmarks.json). No figure is typed in except published ones, which
-are named as such.
+are named as such. The kernel's times are processor times with one thread: what a clock shows on a machine that does
+nothing else.
 """
 
 

@@ -7,13 +7,16 @@ from collections.abc import Callable
 from matplotlib.figure import Figure
 
 from benchmarks.data import ROOT
-from benchmarks.pictures import curves, surfaces
+from benchmarks.pictures import curves, devices, surfaces
 from benchmarks.pictures.canvas import save
 
 FOLDER = ROOT / "docs" / "pictures" / "algorithms"
 
 PICTURES: dict[str, Callable[[], Figure]] = {
     "orientation": curves.orientation,
+    "fusion": devices.fusion,
+    "magnetic_field": devices.magnetic_field,
+    "sketch": devices.sketch,
     "cleaning": curves.cleaning,
     "resampling": curves.resampling,
     "regression": curves.regression,
@@ -22,7 +25,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "bias": curves.bias,
     "uncertainty": curves.uncertainty,
     "node_inference": curves.node_inference,
-    "cell_complex": surfaces.cell_complex_picture,
+    "cycles": surfaces.cycles,
     "patches": surfaces.patches,
     "surface": surfaces.surface,
     "curvature": surfaces.curvature,

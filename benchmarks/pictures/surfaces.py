@@ -28,7 +28,7 @@ STEP = 0.02
 UNIT = "distance to the truth, mm"
 
 
-def cell_complex_picture() -> Figure:
+def cycles() -> Figure:
     """Faces found between the curves, one colour each."""
     drawn = figure()
     for position, name in ((121, "leaf"), (122, "egg")):
