@@ -81,15 +81,6 @@ def test_reference_field_from_inclination() -> None:
     assert field.magnetic[1] > 0 > field.magnetic[2]
 
 
-def test_reference_field_from_a_still_pose() -> None:
-    random = np.random.default_rng(6)
-    field, frame = ReferenceField.from_inclination(np.radians(63)), exp(np.array([0.5, -1.0, 2.0]))
-    acceleration = 9.8 * (np.array(field.acceleration) @ frame) + 0.05 * random.standard_normal((400, 3))
-    magnetic = 48.0 * (np.array(field.magnetic) @ frame) + 0.3 * random.standard_normal((400, 3))
-    found = ReferenceField.from_still_pose(acceleration, magnetic)
-    np.testing.assert_allclose(found.magnetic, field.magnetic, atol=1e-3)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

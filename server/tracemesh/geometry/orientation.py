@@ -29,15 +29,6 @@ class ReferenceField:
         """The field of a place with the given magnetic inclination (rad, positive down), y to magnetic North."""
         return ReferenceField(magnetic=(0.0, float(np.cos(inclination)), -float(np.sin(inclination))))
 
-    @staticmethod
-    def from_still_pose(acceleration: Floats, magnetic: Floats) -> "ReferenceField":
-        """The field that a device at rest, in any attitude, measures as vectors (n, 3); y to magnetic North.
-
-        Only the angle between the two mean vectors matters. Raises ScanError where one is zero or not finite.
-        """
-        a, m = _checked(acceleration, "acceleration"), _checked(magnetic, "magnetic field")
-        return ReferenceField.from_inclination(float(angles_between(a.mean(axis=0), m.mean(axis=0))) - np.pi / 2)
-
     @property
     def angle(self) -> float:
         """Angle between the two directions, rad."""
