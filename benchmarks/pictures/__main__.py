@@ -24,6 +24,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "positions": curves.positions,
     "bias": curves.bias,
     "uncertainty": curves.uncertainty,
+    "spline_network": surfaces.spline_network,
     "node_inference": curves.node_inference,
     "cycles": surfaces.cycles,
     "patches": surfaces.patches,

@@ -1,5 +1,7 @@
 """Pictures of the way from a curve network to a surface."""
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
@@ -11,6 +13,8 @@ from benchmarks.linear_surfaces import biharmonic, planar_patches
 from benchmarks.measuring import Floats, Ints
 from benchmarks.pictures.canvas import (
     BLUE,
+    GREY,
+    ORANGE,
     by_value,
     draw_mesh,
     draw_network,
@@ -22,10 +26,24 @@ from benchmarks.pictures.canvas import (
 )
 from benchmarks.truths import MeshTruth
 from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.spline_network import resample_network
 from tracemesh.geometry.surface import SurfaceParameters, span_surface
 
 STEP = 0.02
 UNIT = "distance to the truth, mm"
+
+
+def spline_network() -> Figure:
+    """Few points, unevenly spaced, and the even network through them."""
+    drawn = figure()
+    truth = built_in("egg").network(STEP)
+    sparse = _thinned(built_in("egg").network(STEP / 2))
+    even = resample_network(sparse, STEP)
+    for position, title, network in ((121, "as drawn", sparse), (122, "resampled", even)):
+        axes = space(drawn, truth.points, position, f"{title}: {len(network.points)} points", (12, -50))
+        draw_network(axes, network, GREY, 0.8)
+        axes.scatter(*network.points.T, s=6, color=ORANGE if position == 121 else BLUE, depthshade=False, zorder=3)
+    return drawn
 
 
 def cycles() -> Figure:
@@ -99,6 +117,16 @@ def evaluation() -> Figure:
     draw_mesh(axes, mesh.vertices, mesh.faces, by_value(drawn, axes, distance, mesh.faces, UNIT, scale))
     draw_network(axes, facing(axes, network), "white", 0.8)
     return drawn
+
+
+def _thinned(network: CurveNetwork) -> CurveNetwork:
+    """The network without three of four points inside its segments, taken out at random."""
+    generator = np.random.default_rng(1)
+    kept = generator.random(len(network.points)) < 0.25
+    kept[network.nodes] = True
+    number = np.cumsum(kept) - 1
+    segments = tuple(replace(s, points=number[s.points[kept[s.points]]]) for s in network.segments)
+    return CurveNetwork(network.points[kept], network.normals[kept], number[network.nodes], segments)
 
 
 def _errors(network: CurveNetwork, *surfaces: tuple[str, Floats, Ints]) -> Figure:
