@@ -80,6 +80,14 @@ def _add_reconstruct(commands: Commands) -> None:
     parser.add_argument(
         "--curve-bias", choices=("auto", "on", "off"), default="auto", help="fit heading and scale per curve (auto)"
     )
+    parser.add_argument(
+        "--length",
+        type=_length,
+        action="append",
+        default=[],
+        metavar="CURVE:SEGMENT=M",
+        help="length of a segment that you measured, both counted from 1; may be repeated",
+    )
     field = parser.add_mutually_exclusive_group()
     field.add_argument(
         "--place", type=_place, metavar="LAT,LON", help="degrees; the magnetic field there (--place=-33.9,151.2)"
@@ -195,6 +203,14 @@ def _place(text: str) -> tuple[float, float]:
     return float(latitude), float(longitude)
 
 
+def _length(text: str) -> tuple[tuple[int, int], float]:
+    segment, _, metres = text.partition("=")
+    curve, _, place = segment.partition(":")
+    if min(int(curve), int(place)) < 1:
+        raise argparse.ArgumentTypeError(f"curves and segments are counted from 1, got {text!r}")
+    return (int(curve) - 1, int(place) - 1), float(metres)
+
+
 def _reconstruct(chosen: argparse.Namespace) -> int:
     from tracemesh.formats.scans import read_scan
     from tracemesh.pipeline import reconstruct
@@ -211,7 +227,7 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
     )
     scan = read_scan(read_text(chosen.input), chosen.input, _field(chosen))
     with ProgressLine() as progress:
-        result = reconstruct(scan, parameters, progress)
+        result = reconstruct(scan, parameters, progress, dict(chosen.length))
     if result.nodes:
         print(f"tracemesh: {_nodes_in_words(result.nodes)}", file=sys.stderr)
     _write_results(chosen, result)
@@ -259,6 +275,8 @@ def _surface(chosen: argparse.Namespace) -> int:
 
 
 def _write_results(chosen: argparse.Namespace, result: Reconstruction) -> None:
+    for warning in result.warnings:
+        print(f"tracemesh: warning: {warning}", file=sys.stderr)
     outputs: dict[Path, bytes] = {}
     if result.mesh is not None:
         outputs[chosen.output] = result.mesh_file(chosen.output.suffix.lower().lstrip("."))

@@ -1,7 +1,7 @@
 """The whole way from a scan to a network and its surface: pure, reports its progress, can be stopped between stages."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from time import perf_counter
@@ -13,8 +13,10 @@ from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
+from tracemesh.geometry.odometry import NOMINAL_SPEED
 from tracemesh.geometry.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
 from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.sketch import give_lengths
 from tracemesh.geometry.surface import SurfaceParameters, span_surface
 from tracemesh.wire.resources import ReconstructionParameters
 
@@ -40,6 +42,12 @@ class Reconstruction:
     report: dict[str, object]
     nodes: InferredNodes | None = None
 
+    @property
+    def warnings(self) -> list[str]:
+        """What a person should know of the result, in sentences."""
+        parts = (self.report.get(name) for name in ("lengths", "network", "surface"))
+        return [w for part in parts if isinstance(part, dict) for w in part["warnings"]]
+
     def mesh_file(self, extension: str = "glb") -> bytes:
         """The mesh as a file of this extension; GLB also holds the network and where it all comes from."""
         if self.mesh is None:
@@ -56,10 +64,14 @@ class Reconstruction:
 
 
 def reconstruct(
-    scan: Scan, parameters: ReconstructionParameters | None = None, progress: Progress | None = None
+    scan: Scan,
+    parameters: ReconstructionParameters | None = None,
+    progress: Progress | None = None,
+    lengths: Mapping[tuple[int, int], float] | None = None,
 ) -> Reconstruction:
     """Curve network of a scan and the surface that spans it.
 
+    lengths: m, of segments that somebody measured, by curve and place on it (see `give_lengths`).
     Raises ScanError or NetworkError when the scan cannot be reconstructed, SurfaceError when no valid mesh spans its
     network, and whatever `progress` raises.
     """
@@ -67,9 +79,11 @@ def reconstruct(
     report = progress or _silent
     begin = perf_counter()
     found = _find_nodes(scan, report) if parameters.infer_nodes else None
-    curves = _network(_marked(scan, found), parameters, _part(report, 0.0, NETWORK_SHARE))
+    scan = give_lengths(_marked(scan, found), lengths or {})
+    curves = _network(scan, parameters, _part(report, 0.0, NETWORK_SHARE))
+    made = {"generator": _generator(), "lengths": _lengths_report(scan)}
     nodes = {"nodes": _nodes_report(found)} if found else {}
-    result = Reconstruction(curves.network, None, {"generator": _generator(), **nodes, "network": curves.report}, found)
+    result = Reconstruction(curves.network, None, {**made, **nodes, "network": curves.report}, found)
     if parameters.surface:
         soft = SOFT_LENGTH if parameters.soft else None
         result = _with_surface(result, SurfaceParameters(soft=soft), _part(report, NETWORK_SHARE, 1.0))
@@ -108,6 +122,15 @@ def _nodes_report(found: InferredNodes) -> dict[str, object]:
         for p in found.proposals
     ]
     return {"least_confidence": LEAST_CONFIDENCE, "proposals": proposals}
+
+
+def _lengths_report(scan: Scan) -> dict[str, object]:
+    """How the lengths of curves, counted from 0, are known."""
+    given = [i for i, c in enumerate(scan.curves) if c.lengths is not None]
+    timed = [i for i, c in enumerate(scan.curves) if c.timed]
+    arbitrary = len(timed) == len(scan.curves) and not given
+    warning = f"no length was measured: the size is that of a hand that moves at {NOMINAL_SPEED:g} m/s"
+    return {"timed_curves": timed, "curves_with_given_lengths": given, "warnings": [warning] if arbitrary else []}
 
 
 def _network(scan: Scan, parameters: ReconstructionParameters, progress: Progress) -> NetworkResult:

@@ -38,6 +38,7 @@ class CleanCurve:
     closed: bool
     boundary: bool
     timed: bool
+    lengths: Floats | None
     index: int
     samples: int
     dropped: int
@@ -185,6 +186,7 @@ def clean_curve(curve: CurveScan, index: int) -> CleanCurve:
         curve.closed,
         curve.boundary,
         curve.timed,
+        curve.lengths,
         index,
         len(bad),
         int(bad.sum()),

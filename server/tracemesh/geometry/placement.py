@@ -36,6 +36,7 @@ class PlacedCurve:
     closed: bool
     boundary: bool
     timed: bool
+    lengths: Floats
     index: int
 
     @property
@@ -92,8 +93,19 @@ def _cut(
         curve.closed,
         curve.boundary,
         curve.timed,
+        _lengths(curve, len(marks) - 1),
         curve.index,
     )
+
+
+def _lengths(curve: CleanCurve, segments: int) -> Floats:
+    if curve.lengths is None:
+        return np.full(segments, np.nan)
+    if len(curve.lengths) != segments:
+        raise ScanError(
+            f"{curve_name(curve.index)} has {segments} segments, but lengths are given for {len(curve.lengths)}"
+        )
+    return curve.lengths
 
 
 def place_curve(curve: CleanCurve) -> PlacedCurve:

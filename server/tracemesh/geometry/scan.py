@@ -27,6 +27,7 @@ class CurveScan:
     acceleration, magnetic: (n, 3) or None, the raw vectors in the device's frame, any unit; used to judge quality.
     time: (n,) s or None, device clock.
     timed: the distance was made from durations; between two nodes it is right up to a factor that is not known.
+    lengths: (s,) m or None, of the segments between its nodes, in order, where somebody measured them; NaN elsewhere.
     """
 
     distance: Floats
@@ -40,6 +41,7 @@ class CurveScan:
     magnetic: Floats | None = None
     time: Floats | None = None
     timed: bool = False
+    lengths: Floats | None = None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ positions and factors follow from one linear least-squares problem:
 c is the speed that all timed segments share. Measured segments have a = 1 and give the scale; without any, c = 1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, diags_array, vstack
 from scipy.sparse.linalg import splu
 
+from tracemesh.errors import ScanError
+from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.placement import PlacedCurve, measured_layout
 from tracemesh.geometry.polyline import measured_edges
 from tracemesh.geometry.positions import segment_vectors
 from tracemesh.geometry.samples import Layout
+from tracemesh.geometry.scan import CurveScan, Scan
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -85,11 +88,48 @@ def _stretched(curve: PlacedCurve, factors: Floats) -> PlacedCurve:
 
 
 def with_lengths(curves: Sequence[PlacedCurve]) -> tuple[PlacedCurve, ...]:
-    """The curves with lengths of timed segments such that the network closes best; measured ones are left alone."""
-    if not any(curve.timed for curve in curves):
-        return tuple(curves)
+    """The curves with the lengths that are given, and on timed segments those with which the network closes best; what
+    a wheel measured is left alone.
+    """
+    curves = tuple(_with_given_lengths(curve) for curve in curves)
+    timed = np.concatenate([np.isnan(curve.lengths) & curve.timed for curve in curves])
+    if not timed.any():
+        return curves
     layout = measured_layout(curves)
-    timed = np.array([curve.timed for curve in curves])[layout.segment_curve]
     factors = _Problem(layout, segment_vectors(layout, measured_edges(curves, layout)[1]), timed).solve()
     parts = np.split(factors, np.cumsum([len(c.marks) - 1 for c in curves])[:-1])
     return tuple(_stretched(c, f) if c.timed else c for c, f in zip(curves, parts, strict=True))
+
+
+def _with_given_lengths(curve: PlacedCurve) -> PlacedCurve:
+    given = ~np.isnan(curve.lengths)
+    return _stretched(curve, np.where(given, curve.lengths / np.diff(curve.marks), 1.0)) if given.any() else curve
+
+
+def give_lengths(scan: Scan, lengths: Mapping[tuple[int, int], float]) -> Scan:
+    """The scan with measured lengths, m, of segments named by their curve and their place on it, both from 0.
+
+    Raises ScanError where there is no such segment, or a length is not a positive number.
+    """
+    for (curve, segment), length in lengths.items():
+        if curve >= len(scan.curves):
+            raise ScanError(f"a length is given for {curve_name(curve)}, but there are {len(scan.curves)} curves")
+        count = _segments(scan.curves[curve])
+        if segment >= count:
+            raise ScanError(
+                f"a length is given for segment {segment + 1} of {curve_name(curve)}, which has {count} of them"
+            )
+        if not 0 < length < np.inf:
+            raise ScanError(
+                f"wanted a positive length for segment {segment + 1} of {curve_name(curve)}, got {length:g}"
+            )
+    return Scan(tuple(_given(i, curve, lengths) for i, curve in enumerate(scan.curves)))
+
+
+def _given(index: int, curve: CurveScan, lengths: Mapping[tuple[int, int], float]) -> CurveScan:
+    known = np.array([lengths.get((index, segment), np.nan) for segment in range(_segments(curve))])
+    return curve if np.isnan(known).all() else replace(curve, lengths=known)
+
+
+def _segments(curve: CurveScan) -> int:
+    return max(len(curve.node_ids) - 1, 1)
