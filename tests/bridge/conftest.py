@@ -239,7 +239,9 @@ class Bench:
         wait_until(lambda: len(self.sent()) >= wanted, f"{count} more frames")
 
     def close(self) -> None:
-        for process in self._processes:
+        for process in reversed(
+            self._processes
+        ):  # a bridge left alone might take the next pseudo-terminal of that name
             process.stop(9)
 
     def start(self, *arguments: str) -> Process:

@@ -88,7 +88,9 @@ class Lab:
         return self._processes["bridge"].wait(60)
 
     def close(self) -> None:
-        for process in self._processes.values():
+        for process in reversed(
+            self._processes.values()
+        ):  # the bridge before its device, whose terminal may be given away
             process.send_signal(signal.SIGKILL)
             process.wait()
             if process.stdin:
