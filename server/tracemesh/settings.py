@@ -42,6 +42,13 @@ class Settings(BaseSettings):
             raise ValueError(f"wanted a token of {MIN_TOKEN} characters or more, got {len(token.get_secret_value())}")
         return token
 
+    @field_validator("database_url")
+    @classmethod
+    def _known_database(cls, url: str) -> str:
+        if url and not url.startswith(("postgresql://", "postgres://", "postgresql+pg8000://", "sqlite:///")):
+            raise ValueError(f"wanted postgresql://USER:PASSWORD@HOST/NAME or nothing, got {url.partition(':')[0]}:...")
+        return url
+
     @model_validator(mode="after")
     def _closed_off_loopback(self) -> Self:
         if self.host not in LOOPBACK and self.token is None:

@@ -53,7 +53,7 @@ class Previewer:
         try:
             scan, indices, curves = await self._scan(session)
             async with self._turn:
-                if self._newest[session, client] is not wish:
+                if self._newest.get((session, client)) is not wish:
                     raise Conflict("the same client asked for another preview meanwhile")
                 return _preview(await self._run(solve_network, scan, indices, parameters), curves)
         finally:

@@ -3,9 +3,13 @@
 import logging
 
 import uvicorn
+from sqlalchemy.exc import SQLAlchemyError
 
 from tracemesh.api.app import create_app
+from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
+from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.storage.database import Database
 
 MAX_MESSAGE = 4 * 2**20
 """Most bytes of one message on a socket."""
@@ -14,9 +18,13 @@ DRAIN = 5
 
 
 def serve(settings: Settings) -> None:
-    """Serve until a signal ends it; what was accepted is committed before it returns."""
+    """Serve until a signal ends it; what was accepted is committed before it returns.
+
+    Raises ResourceError when the data folder or the database cannot be used.
+    """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
+    _prepare(settings)
     configuration = uvicorn.Config(
         create_app(settings),
         host=settings.host,
@@ -30,3 +38,17 @@ def serve(settings: Settings) -> None:
         server_header=False,
     )
     uvicorn.Server(configuration).run()
+
+
+def _prepare(settings: Settings) -> None:
+    """Meet what would keep the service from starting while it can still be said in words."""
+    try:
+        ArtifactStore(settings.artifact_dir)
+        database = Database(settings.resolved_database_url)
+        database.migrate()
+        database.close()
+    except OSError as error:
+        raise ResourceError(f"the data folder {settings.data_dir} cannot be used: {error.strerror}") from None
+    except SQLAlchemyError as error:
+        cause = str(getattr(error, "orig", None) or error).splitlines()[0]
+        raise ResourceError(f"the database cannot be used: {cause}") from None
