@@ -45,6 +45,6 @@ def fit_warnings(layout: Layout, gaps: Floats, expected: Floats, indices: Ints) 
     worst = bad[np.argsort(-gap[bad] / expected[bad])][:_MOST]
     return [
         f"{curve_name(indices[layout.segment_curve[s]])} misses its node by {gap[s]:.2g} m on a segment of "
-        f"{layout.segment_lengths[s]:.2g} m: is a node number wrong?"
+        f"{layout.segment_lengths[s]:.2g} m, more than noise explains: is a node number wrong, or is it smoothed too much?"
         for s in worst
     ]
