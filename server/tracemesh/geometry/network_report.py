@@ -45,6 +45,7 @@ def fit_warnings(layout: Layout, gaps: Floats, expected: Floats, indices: Ints) 
     worst = bad[np.argsort(-gap[bad] / expected[bad])][:_MOST]
     return [
         f"{curve_name(indices[layout.segment_curve[s]])} misses its node by {gap[s]:.2g} m on a segment of "
-        f"{layout.segment_lengths[s]:.2g} m, more than noise explains: is a node number wrong, or is it smoothed too much?"
+        f"{layout.segment_lengths[s]:.2g} m, more than noise explains: "
+        "is a node number wrong, or is it smoothed too much?"
         for s in worst
     ]
