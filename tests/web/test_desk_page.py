@@ -159,6 +159,29 @@ def test_a_file_is_opened_edited_and_reconstructed_with_other_parameters(
     assert [job["parameters"]["step"] for job in jobs] == ["0.901%", "1.6%"]
 
 
+def test_nodes_that_were_not_marked_are_found_and_accepted(server: Server, page: Page, shared_data: Path) -> None:
+    page.goto(server.page())
+    page.locator("input[type=file]").set_input_files(shared_data / "scans" / "cone-noisy.rawnet")
+    curves = page.get_by_role("complementary", name="Curves and nodes")
+    expect(curves.get_by_role("button", name="interior")).to_have_count(4)
+    session = page.url.rsplit("/", 1)[1]
+    for index in (2, 3):
+        server.call("PATCH", f"/sessions/{session}/curves/{index}", {"marks": []})
+
+    curves.get_by_role("button", name="Find nodes").click()
+    proposals = curves.get_by_role("list", name="Proposed nodes").get_by_role("listitem")
+    expect(proposals).to_have_count(4)
+    for left in (3, 2, 1):
+        proposals.first.get_by_role("button", name="Accept").click()
+        expect(proposals).to_have_count(left)
+    proposals.first.get_by_role("button", name="Accept").click()
+    expect(curves.get_by_text("No more nodes were found.")).to_be_visible()
+    marks = [curve["marks"] for curve in server.call("GET", f"/sessions/{session}/curves")]
+    assert len(marks[2]) == len(marks[3]) == 2
+    page.get_by_role("button", name="Reconstruct").click()
+    expect(page.locator("canvas")).to_have_attribute("data-surface", "shown")
+
+
 def test_a_file_that_is_none_is_refused_in_words(server: Server, page: Page, tmp_path: Path) -> None:
     wrong = tmp_path / "wrong.rawnet"
     wrong.write_text("1\n0\nabc\n")

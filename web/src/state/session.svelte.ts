@@ -6,6 +6,8 @@ import type {
   Curve,
   LiveDevice,
   Mark,
+  NodeProposal,
+  NodeProposals,
   Reconstruction,
   ReconstructionParameters,
   RecordingSummary,
@@ -13,8 +15,9 @@ import type {
 } from "../wire.gen";
 import { History } from "./history.svelte";
 import { Network } from "./network";
-import { newName } from "./names";
 import { Latest } from "./latest";
+import { marksWith, newNode, sameMarks, unmarked } from "./marks";
+import { newName } from "./names";
 import { loadResult, type Report, type Result } from "./result";
 
 /** A curve as the list of curves names it. */
@@ -31,6 +34,8 @@ export interface CurveEntry {
 export type CurveFlag = "boundary" | "closed" | "removed";
 
 const LIST_PAUSE = 250;
+/** ms without a word of a running job after which it is asked. */
+const SILENCE = 2000;
 
 /** Everything about the session that is open. High-rate data (points) stays outside the reactive graph; `revision`
  * tells those who draw it that it changed. */
@@ -46,6 +51,8 @@ export class SessionStore {
   result = $state.raw<Result>();
   /** The network with parameters that a hand is moving. */
   preview = $state.raw<{ readonly network: Network; readonly report: Report }>();
+  /** Nodes that the server found, to be accepted or refused; undefined while nobody asked. */
+  proposals = $state.raw<NodeProposals>();
   recordings = $state.raw<readonly RecordingSummary[]>([]);
   problem = $state("");
   /** Counts changes of the drawn network. */
@@ -58,6 +65,7 @@ export class SessionStore {
   readonly #client = newName("page");
   readonly #previews = new Latest((parameters: Partial<ReconstructionParameters>) => this.#try(parameters));
   #listTimer: ReturnType<typeof setTimeout> | undefined;
+  #progressTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
     private readonly api: Api,
@@ -87,6 +95,7 @@ export class SessionStore {
 
   close(): void {
     clearTimeout(this.#listTimer);
+    clearTimeout(this.#progressTimer);
     this.#socket?.close();
   }
 
@@ -142,24 +151,40 @@ export class SessionStore {
     await this.#command(() => this.history.do({ label, run: () => set(value), revert: () => set(!value) }));
   }
 
+  /** Ask the server where curves seem to meet without a mark. */
+  async findNodes(): Promise<void> {
+    await this.#command(async () => {
+      const [found, curves] = await Promise.all([this.api.proposals(this.id), this.api.curves(this.id)]);
+      this.proposals = { ...found, proposals: unmarked(found.proposals, curves) };
+    });
+  }
+
+  /** Mark a proposed node on its curves; can be taken back. */
+  async accept(proposal: NodeProposal): Promise<void> {
+    const number = (curves: readonly Curve[]): number => proposal.node ?? newNode(curves);
+    await this.#editMarks(
+      (curves) => `node ${number(curves)} marked`,
+      ({ index, marks }, curves) =>
+        marksWith(marks, proposal.places.filter((place) => place.curve === index), number(curves)),
+    );
+    this.refuse(proposal);
+  }
+
+  /** Take a proposal off the list. */
+  refuse(proposal: NodeProposal): void {
+    const { proposals } = this;
+    if (proposals) this.proposals = { ...proposals, proposals: proposals.proposals.filter((p) => p !== proposal) };
+  }
+
   /** Let all marks of a node name another one, which joins the two if both exist; undefined deletes them. */
   async editNode(node: number, to: number | undefined): Promise<void> {
-    const edited = (marks: readonly Mark[]): Mark[] =>
-      to === undefined
-        ? marks.filter((mark) => mark.node !== node)
-        : marks.map((mark) => (mark.node === node ? { ...mark, node: to } : mark));
-    await this.#command(async () => {
-      const curves = (await this.api.curves(this.id)).filter((curve) => curve.marks.some((mark) => mark.node === node));
-      const set = async (marks: (curve: Curve) => Mark[]): Promise<void> => {
-        for (const curve of curves) await this.api.updateCurve(this.id, curve.index, { marks: marks(curve) });
-        this.#outdate();
-      };
-      await this.history.do({
-        label: `node ${node} ${to === undefined ? "deleted" : `is now ${to}`}`,
-        run: () => set((curve) => edited(curve.marks)),
-        revert: () => set((curve) => curve.marks),
-      });
-    });
+    await this.#editMarks(
+      () => `node ${node} ${to === undefined ? "deleted" : `is now ${to}`}`,
+      ({ marks }) =>
+        to === undefined
+          ? marks.filter((mark) => mark.node !== node)
+          : marks.map((mark) => (mark.node === node ? { ...mark, node: to } : mark)),
+    );
   }
 
   async undo(): Promise<void> {
@@ -168,6 +193,24 @@ export class SessionStore {
 
   async redo(): Promise<void> {
     await this.#command(() => this.history.redo());
+  }
+
+  /** Replace the marks of every curve that `edited` changes; can be taken back. */
+  async #editMarks(
+    label: (curves: readonly Curve[]) => string,
+    edited: (curve: Curve, curves: readonly Curve[]) => Mark[],
+  ): Promise<void> {
+    await this.#command(async () => {
+      const curves = await this.api.curves(this.id);
+      const changes = curves
+        .map((curve) => ({ index: curve.index, old: curve.marks, fresh: edited(curve, curves) }))
+        .filter(({ old, fresh }) => !sameMarks(old, fresh));
+      const set = async (which: "old" | "fresh"): Promise<void> => {
+        for (const change of changes) await this.api.updateCurve(this.id, change.index, { marks: change[which] });
+        this.#outdate();
+      };
+      await this.history.do({ label: label(curves), run: () => set("fresh"), revert: () => set("old") });
+    });
   }
 
   #fold(message: Exclude<ToBrowser, LiveDevice | { type: "live.reconstruction" }>): void {
@@ -192,7 +235,14 @@ export class SessionStore {
   #progressed(reconstruction: Reconstruction): void {
     if (this.reconstruction && reconstruction.created < this.reconstruction.created) return;
     this.reconstruction = reconstruction;
+    clearTimeout(this.#progressTimer);
+    if (isBusy(reconstruction)) this.#progressTimer = setTimeout(() => void this.#ask(reconstruction.id), SILENCE);
     if (reconstruction.state === "done") void this.#attempt(() => this.#show(reconstruction));
+  }
+
+  /** The live path may drop what it has to say, so a job that is silent is asked. */
+  async #ask(id: string): Promise<void> {
+    await this.#attempt(async () => this.#progressed(await this.api.reconstruction(id)));
   }
 
   async #show(reconstruction: Reconstruction): Promise<void> {

@@ -1,0 +1,38 @@
+import { expect, it } from "vitest";
+import type { Curve } from "../wire.gen";
+import { marksWith, newNode, sameMarks, unmarked } from "./marks";
+
+const marks = [
+  { sample: 0, node: 1 },
+  { sample: 90, node: 2 },
+];
+
+it("adds places in the order of the samples, none twice", () => {
+  const places = [
+    { curve: 4, sample: 40 },
+    { curve: 4, sample: 90 },
+  ];
+  const added = marksWith(marks, places, 2);
+  expect(added).toEqual([marks[0], { sample: 40, node: 2 }, marks[1]]);
+  expect(marksWith(added, places, 2)).toEqual(added);
+});
+
+it("tells whether marks are the same", () => {
+  expect(sameMarks(marks, marks.map((mark) => ({ ...mark })))).toBe(true);
+  expect(sameMarks(marks, marks.slice(1))).toBe(false);
+  expect(sameMarks(marks, [{ sample: 0, node: 1 }, { sample: 90, node: 3 }])).toBe(false);
+});
+
+it("leaves of proposals what is not marked yet", () => {
+  const curves = [{ index: 0, marks }, { index: 1, marks: [] as typeof marks }] as Curve[];
+  const places = [
+    { curve: 0, sample: 90 },
+    { curve: 1, sample: 7 },
+  ];
+  const half = { node: 2, confidence: 0.9, places };
+  const whole = { node: 2, confidence: 1, places: places.slice(0, 1) };
+  const fresh = { node: null, confidence: 0.5, places };
+  expect(unmarked([half, whole, fresh], curves)).toEqual([{ ...half, places: places.slice(1) }, fresh]);
+  expect(newNode(curves)).toBe(3);
+  expect(newNode([])).toBe(0);
+});

@@ -1,0 +1,25 @@
+import type { Curve, Mark, NodePlace, NodeProposal } from "../wire.gen";
+
+/** A curve's marks with a node marked at more places, in the order of the samples; nothing is marked twice. */
+export function marksWith(marks: readonly Mark[], places: readonly NodePlace[], node: number): Mark[] {
+  const fresh = places.filter(({ sample }) => !marks.some((mark) => mark.sample === sample && mark.node === node));
+  return [...marks, ...fresh.map(({ sample }) => ({ sample, node }))].sort((a, b) => a.sample - b.sample);
+}
+
+export function sameMarks(a: readonly Mark[], b: readonly Mark[]): boolean {
+  return a.length === b.length && a.every((mark, i) => mark.sample === b[i]?.sample && mark.node === b[i]?.node);
+}
+
+/** What of the proposals is not marked yet; a curve that has the node already needs no second mark of it. */
+export function unmarked(proposals: readonly NodeProposal[], curves: readonly Curve[]): NodeProposal[] {
+  const isMarked = (place: NodePlace, node: number | null): boolean =>
+    curves.some(({ index, marks }) => index === place.curve && marks.some((mark) => mark.node === node));
+  return proposals
+    .map((proposal) => ({ ...proposal, places: proposal.places.filter((place) => !isMarked(place, proposal.node)) }))
+    .filter((proposal) => proposal.places.length > 0);
+}
+
+/** A number that no node of these curves has. */
+export function newNode(curves: readonly Curve[]): number {
+  return Math.max(-1, ...curves.flatMap((curve) => curve.marks.map((mark) => mark.node))) + 1;
+}
