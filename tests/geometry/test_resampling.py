@@ -97,6 +97,14 @@ def test_segments_shorter_than_a_step_are_one_edge() -> None:
     assert np.isfinite(samples.frames).all()
 
 
+def test_a_segment_that_returns_to_its_node_has_three_edges_at_least() -> None:
+    arc = np.linspace(0, 1, 1001)
+    placed = [place_curve(clean_curve(scan_of(arc, [0, 500, 520, 1000], [0, 1, 1, 2]), 0))]
+    assert np.diff(uniform_layout(placed, 0.05).marks).tolist() == [10, 3, 10]
+    free = [place_curve(clean_curve(scan_of(arc, [], []), 0))]
+    assert np.diff(uniform_layout(free, 0.9).marks).tolist() == [1]
+
+
 @pytest.mark.parametrize("count", [2, 3, 4, 5])
 @pytest.mark.parametrize("closed", [False, True])
 def test_very_few_samples_give_finite_rotations(count: int, closed: bool) -> None:

@@ -153,8 +153,8 @@ def uniform_layout(curves: Sequence[PlacedCurve], step: float) -> Layout:
     arcs, marks = [], []
     for curve in curves:
         lengths = np.diff(curve.marks)
-        fewest = 3 if len(lengths) == 1 and curve.nodes[0] == curve.nodes[-1] else 1
-        counts = np.maximum(np.rint(lengths / step).astype(np.int64), fewest)
+        returns = (curve.nodes[1:] == curve.nodes[:-1]) & ((curve.nodes[1:] != _LOOSE) | curve.closed)
+        counts = np.maximum(np.rint(lengths / step).astype(np.int64), np.where(returns, 3, 1))
         ends = np.concatenate([[0], np.cumsum(counts)])
         arcs.append(np.interp(np.arange(ends[-1] + 1), ends, curve.marks))
         marks.append(ends)
