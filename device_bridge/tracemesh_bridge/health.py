@@ -29,9 +29,13 @@ class Health:
             self._recent.popleft()
 
     @property
-    def clock_offset(self) -> float | None:
-        """s, smallest of (arrival - device time) lately: between the two clocks, plus the quickest way here."""
-        return min((r.received - r.time for r in self._recent if r.time is not None), default=None)
+    def lag(self) -> float | None:
+        """s that the newest reading took longer than the quickest one lately; None if the device has no clock.
+
+        Two clocks differ by an offset nobody knows; the smallest (arrival - device time) is it, plus the quickest way.
+        """
+        delays = [r.received - r.time for r in self._recent if r.time is not None]
+        return delays[-1] - min(delays) if delays else None
 
     def fault(self, kind: str) -> None:
         """Count something that went wrong: late, short, surplus, implausible, ..."""
@@ -47,6 +51,7 @@ class Health:
             return "no sample yet"
         parts = [f"{self.rate(now):.1f} Hz", f"jitter {1000 * self._jitter():.1f} ms"]
         parts.append(f"age {now - self._recent[-1].received:.1f} s")
+        parts.extend([] if self.lag is None else [f"lag {1000 * self.lag:.0f} ms"])
         parts.extend(self._field())
         parts.extend(f"{count} {kind}" for kind, count in sorted(self.faults.items()))
         return "  ".join(parts)

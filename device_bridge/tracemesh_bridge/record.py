@@ -12,6 +12,7 @@ from tracemesh.wire.device import Device, Hello
 from tracemesh_bridge.bridge import Bridge, upload
 from tracemesh_bridge.console import Console
 from tracemesh_bridge.health import Host
+from tracemesh_bridge.recorder import Recorder
 from tracemesh_bridge.source import Link, Source
 from tracemesh_bridge.spool import Spool, exclusive, open_spools
 from tracemesh_bridge.uplink import Uplink
@@ -47,6 +48,9 @@ async def _record(server: str, spool: Spool, left_over: list[Spool], make_source
         return Uplink(server, os.environ.get(TOKEN_VARIABLE, ""), spool, Link(name, console.say))
 
     host = Host(Link("device", console.say))
+    for old in left_over:
+        Recorder(old)  # takes in the samples that were in no message yet when the bridge was killed
+        old.sync()
     bridge = Bridge(make_source(host), spool, uplink(spool, "server"), host, console)
     uploads = [asyncio.ensure_future(upload(s, uplink(s, f"left-over {s.place.name}"))) for s in left_over]
     try:

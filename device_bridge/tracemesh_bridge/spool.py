@@ -34,7 +34,10 @@ class Spool:
     """One recording on disk. One thread appends; `sync` may run in another."""
 
     def __init__(self, folder: Path, hello: Hello, segment_bytes: int = SEGMENT_BYTES) -> None:
-        """Open the recording in `folder`, or begin it. Raises SpoolError if a file holds what no spool wrote."""
+        """Open the recording in `folder`, or begin it. Raises SpoolError if a file holds what no spool wrote.
+
+        written, durable, next_seq: how many messages are on disk, there to stay, and there or waiting in memory.
+        """
         self.place = folder
         self.hello = hello
         self.trouble = ""
@@ -42,18 +45,14 @@ class Spool:
         self._lock = threading.Lock()
         self._waiting: deque[Recorded] = deque()
         folder.mkdir(parents=True, exist_ok=True)
+        _sync_folder(folder.parent)
         self._firsts = _whole_segments(folder)
         self.first_seq = self._firsts[0] if self._firsts else 0
         self._file = -1
         self._size = 0
         self.written = self._open_last() if self._firsts else 0
-        self.durable = self.written
+        self.durable = self.next_seq = self.written
         self._staged = os.open(folder / _STAGED, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o600)
-
-    @property
-    def next_seq(self) -> int:
-        """Number of the message to be appended next."""
-        return self.written + len(self._waiting)
 
     def append(self, message: Recorded) -> None:
         """Write the next message. Raises SpoolError if the disk is full and too many wait already."""
@@ -62,6 +61,7 @@ class Spool:
         if len(self._waiting) >= MAX_WAITING:
             raise SpoolError(f"{self.trouble}; {MAX_WAITING} messages wait in memory, no more can")
         self._waiting.append(message)
+        self.next_seq += 1
         self._write_waiting()
 
     def stage(self, samples: Samples) -> None:
@@ -223,10 +223,11 @@ def exclusive(root: Path) -> Iterator[None]:
     root.mkdir(parents=True, exist_ok=True)
     file = os.open(root / "lock", os.O_RDWR | os.O_CREAT, 0o600)
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise SpoolError(f"another bridge uses {root}; give this one a folder of its own: --spool") from error
         yield
-    except BlockingIOError as error:
-        raise SpoolError(f"another bridge uses the spool {root}; give this one a folder of its own: --spool") from error
     finally:
         os.close(file)
 

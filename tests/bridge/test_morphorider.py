@@ -2,6 +2,7 @@
 
 import os
 import select
+import socket
 import struct
 import threading
 import time
@@ -201,5 +202,23 @@ def test_the_last_matching_port_is_used(tmp_path):
     for name in ("ttyUSB0", "ttyUSB1"):
         (tmp_path / name).touch()
     assert find_port(str(tmp_path / "ttyUSB*")) == str(tmp_path / "ttyUSB1")
+    (tmp_path / "ttyUSB10").touch()
+    (tmp_path / "ttyUSB11").symlink_to(tmp_path / "gone")
+    assert find_port(str(tmp_path / "ttyUSB*")) == str(tmp_path / "ttyUSB10")
     assert find_port(str(tmp_path / "rfcomm*")) is None
     assert find_port("socket://bench:7000") == "socket://bench:7000"
+
+
+def test_a_device_behind_a_network_socket():
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve():
+            connection, _ = listening.accept()
+            with connection, suppress(OSError):
+                for n in range(1, 6):
+                    connection.recv(1)
+                    connection.sendall(frame(0, n))
+
+        threading.Thread(target=serve, daemon=True).start()
+        rig = Rig(f"socket://127.0.0.1:{listening.getsockname()[1]}", timeout=1.0)
+        assert rig.frames(3) == [frame(0, n).hex() for n in (1, 2, 3)]

@@ -188,7 +188,7 @@ def test_a_recording_is_continued_only_by_the_same_device_for_the_same_session(t
 
 
 def test_one_bridge_per_spool(tmp_path):
-    with exclusive(tmp_path), pytest.raises(SpoolError, match="another bridge"), exclusive(tmp_path):
+    with exclusive(tmp_path), pytest.raises(SpoolError, match="another bridge uses"), exclusive(tmp_path):
         pass
     with exclusive(tmp_path):
         pass

@@ -9,6 +9,7 @@ import glob
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import serial
 
@@ -32,7 +33,7 @@ SEARCH_PERIOD = 0.5
 
 @dataclass(frozen=True)
 class MorphoriderSettings:
-    """How to reach the device. port: a path, or a pattern such as /dev/rfcomm* whose newest match is used; rate: most
+    """How to reach the device. port: a path, or a pattern such as /dev/rfcomm* whose last match is used; rate: most
     requests per second; timeout: s to wait for an answer.
     """
 
@@ -130,18 +131,17 @@ class _Odometer:
     def follow(self, ticks: tuple[int, int], now: float) -> tuple[int, int] | None:
         """The counter, continued over restarts, or None if it is not believed (yet)."""
         count = ticks[0] * self._wheel.ticks_per_turn + ticks[1]
-        if not self._reachable(self._believed, count, now):
-            self._repeats = self._repeats + 1 if self._reachable(self._doubted, count, now) else 1
+        if self._believed and not self._reachable(self._believed, count, now):
+            agrees = self._doubted is not None and self._reachable(self._doubted, count, now)
+            self._repeats = self._repeats + 1 if agrees else 1
             self._doubted = (count, now)
             if self._repeats < REPEATS:
                 return None
-            self._offset += (self._believed or self._doubted)[0] - count
+            self._offset += self._believed[0] - count
         self._believed, self._doubted, self._repeats = (count, now), None, 0
         return divmod(count + self._offset, self._wheel.ticks_per_turn) if self._offset else ticks
 
-    def _reachable(self, before: tuple[int, float] | None, count: int, now: float) -> bool:
-        if before is None:
-            return self._doubted is None
+    def _reachable(self, before: tuple[int, float], count: int, now: float) -> bool:
         # One turn more: the two integers of a counter may be read just before and just after a turn is complete.
         turns = TOP_SPEED * (now - before[1]) / self._wheel.circumference + 1
         return abs(count - before[0]) <= turns * self._wheel.ticks_per_turn
@@ -151,8 +151,9 @@ def find_port(pattern: str) -> str | None:
     """The last port that matches, or None. A URL of pyserial's (socket://host:port, ...) is taken as it is."""
     if "://" in pattern:
         return pattern
-    ports = sorted(glob.glob(pattern))  # noqa: PTH207 - an absolute pattern, which Path.glob refuses
-    return ports[-1] if ports else None
+    ports = glob.glob(pattern)  # noqa: PTH207 - an absolute pattern, which Path.glob refuses
+    there = [p for p in ports if Path(p).exists()]  # a link may outlive its device
+    return max(there, key=lambda p: (len(p), p), default=None)  # ttyUSB10 comes after ttyUSB9
 
 
 def open_port(port: str, timeout: float) -> serial.Serial:
