@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -171,4 +172,42 @@ def test_a_browser_that_does_not_read_delays_nobody(server: Any, ride: Any, line
 
 def test_an_unknown_session_is_told(server: Any) -> None:
     with server.connect("/sessions/nowhere/live") as socket, pytest.raises(Exception, match="4404"):
+        socket.recv(timeout=10)
+
+
+def test_whoever_joins_at_any_moment_misses_nothing(server: Any, ride: Any, line: Any) -> None:
+    """Browsers join while a device sends without waiting for acknowledgements: all see the same curve in the end."""
+    session = server.new_session()
+    rider = ride("busy", session)
+    messages = line(1200, block=5)
+    joined = []
+    with ExitStack() as stack:
+        for number, message in enumerate(messages):
+            rider.send(message)
+            if number % 60 == 30:
+                joined.append(stack.enter_context(server.connect(f"/sessions/{session}/live")))
+        rider.wait_for_ack(len(messages) - 1)
+        drawings = [drawn(_until_ended(socket)) for socket in joined]
+    assert len(drawings) == 4
+    assert drawings[0][0][-3] == pytest.approx(1.197, abs=0.0031)
+    assert all(drawing == drawings[0] for drawing in drawings)
+
+
+def _until_ended(socket: Any) -> list[dict[str, Any]]:
+    """Everything up to the end of curve 0, whichever message says so."""
+    return watch(
+        socket,
+        lambda m: m["type"] == "live.curve.end" or any(c["ended"] for c in m.get("curves", [])),
+        limit=2000,
+    )
+
+
+def test_a_deleted_session_sends_its_watchers_away(server: Any) -> None:
+    session = server.new_session()
+    with server.connect(f"/sessions/{session}/live") as socket:
+        watch(socket, is_type("live.snapshot"))
+        server.http.delete(f"/sessions/{session}")
+        with pytest.raises(Exception, match="1012"):
+            watch(socket, lambda m: False)
+    with server.connect(f"/sessions/{session}/live") as socket, pytest.raises(Exception, match="4404"):
         socket.recv(timeout=10)

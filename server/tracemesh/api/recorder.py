@@ -108,7 +108,7 @@ class Recorder:
 
     def accept(self, state: RecordingState, message: Recorded, payload: bytes) -> None:
         """Take a message; one that was sent before is only acknowledged again. Raises Refused."""
-        if state.key not in self._open or self._open[state.key][0] is not state:
+        if self._closing or state.key not in self._open or self._open[state.key][0] is not state:
             raise Refused("storage", "the recording is not open any more; connect again")
         if message.seq < state.next_seq:
             self._batch.group.acknowledge(state)
@@ -125,7 +125,8 @@ class Recorder:
         """Wait until everything accepted so far is durable."""
         batch = self._batch
         self._wake.set()
-        await batch.done.wait()
+        if not self._task.done():
+            await batch.done.wait()
 
     async def delete_session(self, identifier: str) -> None:
         """Cut off who records into a session, then delete it. Raises NotFound."""
@@ -165,6 +166,7 @@ class Recorder:
             if batch.group.reached:
                 await self._commit(batch.group)
             batch.done.set()
+        self._batch.done.set()
 
     async def _commit(self, group: Group) -> None:
         try:

@@ -78,7 +78,7 @@ class Hub:
 
     def join(self, session: str) -> tuple[Room, Client]:
         """Somebody watches."""
-        if session not in self._rooms:
+        if session not in self._rooms or self._rooms[session].stopped:
             self._rooms[session] = Room(session, self._meters[session], self._load, self._solve)
         room, client = self._rooms[session], Client()
         room.clients.add(client)
@@ -98,6 +98,8 @@ class Hub:
             self._meters[session] = kept
 
     async def _load(self, session: str) -> tuple[SessionTracker, Reconstruction | None]:
+        await self._flush()  # what comes from now on is in the room's hands
+
         def read() -> tuple[SessionTracker, Reconstruction | None]:
             with self._database.read() as transaction:
                 tracker = SessionTracker.load(transaction, session)

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from tracemesh.api.live.client import Client
 from tracemesh.api.live.meter import Meter
 from tracemesh.api.live.tracker import Accepted, SessionTracker
+from tracemesh.errors import NotFound
 from tracemesh.jobs.attached import SolvedNetwork
 from tracemesh.wire.device import CurveEnd, NodeMark
 from tracemesh.wire.live import LiveReconstruction, Snapshot
@@ -36,6 +37,7 @@ class Room:
         """`meters`: of the session's devices, kept by the caller; `load` and `solve` read what is committed."""
         self.session = session
         self.clients: set[Client] = set()
+        self.stopped = False
         self._meters = meters
         self._load = load
         self._solve = solve
@@ -129,7 +131,10 @@ class Room:
     async def _guard(self, work: Callable[[], Awaitable[None]]) -> None:
         try:
             await work()
+        except NotFound:
+            log.info("session %s is gone", self.session)
         except Exception:
             log.exception("live view of session %s stopped", self.session)
-            for client in self.clients:
-                client.end()
+        self.stopped = True
+        for client in self.clients:
+            client.end()
