@@ -1,16 +1,19 @@
 """Laws of spanned surfaces: on networks with known truth, on exact shapes, and under changes that must not matter."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from tests.geometry.network_fixtures import octants, radial, rings, sideways, upwards, window
-from tracemesh.errors import Cancelled, SurfaceError
+from tracemesh.errors import Cancelled, SurfaceError, TracemeshError
 from tracemesh.formats.networks import read_network
 from tracemesh.geometry.edges import unique_edges
 from tracemesh.geometry.mesh import Mesh
@@ -204,3 +207,32 @@ def test_progress_tells_every_stage_and_can_stop() -> None:
 
     with pytest.raises(Cancelled):
         span_surface(octants(0.3), progress=stop)
+
+
+@given(
+    st.lists(st.floats(-1.5, 1.5), min_size=5, max_size=5),
+    st.floats(0, 0.3),
+    st.integers(1, 5),
+    st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=25, deadline=None)
+def test_any_network_gives_a_manifold_or_a_clear_error(shape: list[float], noise: float, parts: int, seed: int) -> None:
+    """Steep, saddle-like and noisy windows."""
+    a, b, c, d, e = shape
+
+    def height(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+        return a * x**2 + b * x * y + c * y**2 + d * x + e * y, 2 * a * x + b * y + d, b * x + 2 * c * y + e
+
+    network = window(parts, height)
+    draw = np.random.default_rng(seed)
+    points = network.points + noise / parts * draw.normal(size=network.points.shape)
+    network = replace(network, points=points, normals=radial(network.normals + noise * draw.normal(size=points.shape)))
+    try:
+        result = span_surface(network)
+    except TracemeshError as error:
+        assert "segment" in str(error) or "curve" in str(error) or "network" in str(error)
+    else:
+        assert_oriented_manifold(result.mesh)
+        assert result.report["euler_number"] == 1 or noise > 0.1  # curves are sorted wrongly around a node
+        assert np.isfinite(result.mesh.vertices).all()
+        json.dumps(result.report, allow_nan=False)

@@ -8,6 +8,7 @@ from tracemesh.errors import SurfaceError
 from tracemesh.geometry.bridges import Outline, joined_outline, plain_outline
 from tracemesh.geometry.cell_complex import CellComplex, segment_name
 from tracemesh.geometry.curvature import normalised
+from tracemesh.geometry.edges import unique_edges
 from tracemesh.geometry.flattening import flatten
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints
 from tracemesh.geometry.planar_maps import SMALLEST_AVERAGE, develop, map_to_circle, project_to_plane, signed_area
@@ -72,7 +73,7 @@ def triangulate_patches(
         lift.append(np.tile(_lift(outline), (len(inside), 1)))
         count += len(inside)
         begin += len(loop) + len(inside)
-    return PatchMesh(
+    mesh = PatchMesh(
         np.vstack(planar),
         np.vstack(faces),
         np.concatenate(vertex),
@@ -82,6 +83,17 @@ def triangulate_patches(
         fixed,
         count,
     )
+    _check_manifold(mesh.faces)
+    return mesh
+
+
+def _check_manifold(faces: Ints) -> None:
+    edges, count = unique_edges(faces)
+    if count.max() > 2:
+        a, b = edges[count.argmax()]
+        raise SurfaceError(
+            f"the patches on both sides of points {a} and {b} of the network cut the same corner: add points"
+        )
 
 
 def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool:

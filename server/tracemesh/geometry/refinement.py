@@ -72,14 +72,16 @@ def refine(vertices: Floats, normals: Floats, faces: Ints, patch: Ints, fixed: i
     length = LENGTH_PER_PATCH * float(np.sqrt(areas.sum() / (patch.max() + 1)))
     given = shape = Shape(vertices, normals, faces, interior_edges(faces), boundary_vertices(faces, len(vertices)))
     energies = []
-    for _ in range(STEPS):
-        shape, energy, move = _gauss_newton_step(shape, fixed, length, size)
-        energies.append(energy)
-        if move < CONVERGED * size:
-            break
-    residual = _system(shape, length, size)[1]
-    gain = energies[0] / max(float(residual @ residual), 1e-30 * energies[0], np.finfo(float).tiny)
-    kept = _untrusted(given, shape, patch)[:, None]
+    with np.errstate(all="ignore"):  # where steps diverge, the surface given is kept
+        for _ in range(STEPS):
+            shape, energy, move = _gauss_newton_step(shape, fixed, length, size)
+            energies.append(energy)
+            if not move >= CONVERGED * size:
+                break
+        residual = _system(shape, length, size)[1]
+        kept = _untrusted(given, shape, patch)[:, None]
+    after = float(residual @ residual) if np.isfinite(residual).all() else np.inf
+    gain = energies[0] / max(after, 1e-30 * energies[0], np.finfo(float).tiny)
     return Refined(
         np.where(kept, vertices, shape.vertices),
         np.where(kept, normals, shape.normals),
@@ -104,7 +106,7 @@ def _untrusted(given: Shape, refined: Shape, patch: Ints) -> NDArray[np.bool_]:
     worse = np.bincount(patch, after) > np.bincount(patch, before)
     moved = np.linalg.norm(refined.vertices - given.vertices, axis=1)[faces].max(1)
     area = np.bincount(patch, triangle_areas(given.vertices[faces]))
-    np.logical_or.at(worse, patch, moved > LARGEST_MOVE * np.sqrt(area[patch]))
+    np.logical_or.at(worse, patch, ~(moved <= LARGEST_MOVE * np.sqrt(area[patch])))
     mask = np.zeros(len(given.vertices), bool)
     mask[faces[worse[patch]]] = True
     return mask

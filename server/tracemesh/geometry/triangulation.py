@@ -39,7 +39,7 @@ def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
     for _ in range(RELAXATIONS if len(inside) else 0):
         inside = _smoothed(fixed, _smoothed(fixed, inside, faces), faces)
         faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))
-    inside = np.vstack([fixed[len(loop) :], inside])
+    inside, faces = _without_strays(len(loop), np.vstack([fixed[len(loop) :], inside]), faces)
     return _split_chords(loop, inside, faces)
 
 
@@ -108,6 +108,16 @@ def _densified(loop: Floats, spacing: float) -> Floats:
     return np.asarray(np.repeat(loop, parts, axis=0) + np.repeat(edges / parts[:, None], parts, axis=0) * step[:, None])
 
 
+def _without_strays(count: int, inside: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """Interior points without those in no face, which fell outside of a very crooked polygon. count: corners of
+    the loop.
+    """
+    used = np.zeros(count + len(inside), bool)
+    used[faces] = True
+    used[:count] = True
+    return inside[used[count:]], (np.cumsum(used) - 1)[faces]
+
+
 def _constrained_delaunay(count: int, points: Floats) -> Ints:
     """(f, 3) faces of the constrained Delaunay triangulation of the polygon of the first points with the others
     inside.
@@ -161,7 +171,8 @@ def _smoothed(fixed: Floats, inside: Floats, faces: Ints) -> Floats:
     weight = np.bincount(faces.ravel(), np.repeat(area, 3), len(points))
     moment = (a + b + c) / 3 * area[:, None]
     mean = np.column_stack([np.bincount(faces.ravel(), np.repeat(moment[:, k], 3), len(points)) for k in range(2)])
-    return np.asarray(mean[len(fixed) :] / weight[len(fixed) :, None])
+    weight, mean = weight[len(fixed) :, None], mean[len(fixed) :]
+    return np.where(weight > 0, mean / np.where(weight > 0, weight, 1.0), inside)
 
 
 def _split_chords(loop: Floats, inside: Floats, faces: Ints) -> tuple[Floats, Ints]:
