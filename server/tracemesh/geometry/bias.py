@@ -6,7 +6,7 @@ show shrinks to nothing. Whether b, s, u are modelled is chosen by the likelihoo
 variance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 
 _MOST_MARKS = 150  # that a few variances need to be well known
 _ITERATIONS = 60
+_NOISE_ITERATIONS = 5
 _CHANGE = 0.01  # of every variance in an iteration, at which it ends
 _LEAST = 1e-12  # square of a deviation, relative to where the iteration starts, that stands for none
 _TRUST = 4.0  # equations' worth of trust in the expected noise
@@ -98,9 +99,23 @@ class _Estimation:
         self._rotation = (rotation + rotation.T) / 2 + max(_LEAST, _LEAST * float(np.trace(rotation))) * np.eye(3)
         self._scale = float(square[3 * c : 4 * c].mean()) + _LEAST
         self._shift = float(square[4 * c :].mean()) + _LEAST * self._unit**2
+        self._update_noise(mean, second)
+
+    def _update_noise(self, mean: Floats, second: Floats) -> None:
         self._noise = [
             _noise(p, p.total - 2 * float(p.linear @ mean) + float(np.sum(p.square * second))) for p in self._parts
         ]
+
+    def noise_given(self, variances: Variances) -> Variances:
+        """Other variances of the noise, as these equations show them, to given ones of the errors."""
+        self._rotation, self._scale, self._shift = variances.rotation, variances.scale, variances.shift
+        self._noise = [variances.segments, variances.normals]
+        for _ in range(_NOISE_ITERATIONS):
+            matrix, right = self._system()
+            inverse = np.asarray(np.linalg.inv(matrix))
+            mean = inverse @ right
+            self._update_noise(mean, inverse + np.outer(mean, mean))
+        return replace(variances, segments=self._noise[0], normals=self._noise[1])
 
 
 def _noise(part: Summary, squares: float) -> float:
@@ -118,6 +133,13 @@ def _evidence(parts: tuple[Summary, Summary], noise: list[float], rest: float, v
 def _without_bias(parts: tuple[Summary, Summary]) -> Variances:
     noise = [_noise(p, p.total) for p in parts]
     return Variances(np.zeros((3, 3)), 0.0, 0.0, noise[0], noise[1], _evidence(parts, noise, 0.0, 0))
+
+
+def with_noise_of(misclosures: Misclosures, variances: Variances) -> Variances:
+    """Known variances of the errors of whole curves, with the noise that other equations of the same network show."""
+    (segments, normals), curves, marks = misclosures.sample(_MOST_MARKS)
+    parts = segments.eliminated(), normals.eliminated()
+    return _Estimation(parts, len(curves), len(marks), 1.0).noise_given(variances)
 
 
 def estimate_variances(misclosures: Misclosures, first_shift: float) -> tuple[Variances, Variances]:

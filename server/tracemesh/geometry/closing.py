@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracemesh.geometry.adjustment import Adjustment, Corrections
-from tracemesh.geometry.bias import Variances, estimate_variances
+from tracemesh.geometry.bias import Variances, estimate_variances, with_noise_of
 from tracemesh.geometry.correction import correct_curves
 from tracemesh.geometry.misclosure import Misclosures
 from tracemesh.geometry.placement import PlacedCurve, moved_layout
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Mode = Literal["auto", "on", "off"]
 
 _ROUNDS = 4
-_SMALL = 0.04  # rad; the equations err by half the square of what they are about
+_SMALL = 0.05  # rad; the equations err by half the square of what they are about
 
 _CLEARLY = 1.5  # more than chance makes of a few loops
 _FIRST_SHIFT = 0.05  # steps: a first guess at the deviation of node marks
@@ -87,10 +87,11 @@ def _next(found: Closing, curves: Sequence[PlacedCurve], layout: Layout, choice:
     """What is left of the errors found so far; the noise is estimated again, without what large rotations added."""
     noise = noise_level(curves, choice, step)
     misclosures = Misclosures(layout, choice.frames, noise)
-    _, left = estimate_variances(misclosures, _FIRST_SHIFT * step)
-    variances = replace(found.variances, segments=left.segments, normals=left.normals)
+    variances = with_noise_of(misclosures, found.variances)
     adjustment = Adjustment(misclosures, variances, found.corrections)
-    return Closing(variances, adjustment, adjustment.solution(), found.gain, noise.walk * left.segments, noise.drift)
+    return Closing(
+        variances, adjustment, adjustment.solution(), found.gain, noise.walk * variances.segments, noise.drift
+    )
 
 
 def close_network(
