@@ -36,6 +36,8 @@ def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
     fixed = np.vstack([loop, _points_beside_short_edges(loop)])
     inside = _graded_lattice(loop, fixed, spacing)
     faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))
+    inside = np.vstack([inside, loop[_first_chords(loop, faces)].mean(1)])
+    faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))
     for _ in range(RELAXATIONS if len(inside) else 0):
         inside = _smoothed(fixed, _smoothed(fixed, inside, faces), faces)
         faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))
@@ -45,8 +47,7 @@ def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
 
 def _points_beside_short_edges(loop: Floats) -> Floats:
     """(m, 2) a point inside of every edge much shorter than one beside it: where it opens the smallest angle of its
-    triangles
-    with the edge and the two beside it most.
+    triangles with the edge and the two beside it most.
     """
     count = len(loop)
     length = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
