@@ -236,12 +236,14 @@ class Bench:
     def samples(self, count: int) -> None:
         """Wait until the device has sent so many more frames."""
         wanted = len(self.sent()) + count
-        wait_until(lambda: len(self.sent()) >= wanted, f"{count} more frames")
+        try:
+            wait_until(lambda: len(self.sent()) >= wanted, f"{count} more frames")
+        except AssertionError as error:
+            raise AssertionError("\n".join(p.said for p in self._processes)) from error
 
     def close(self) -> None:
-        for process in reversed(
-            self._processes
-        ):  # a bridge left alone might take the next pseudo-terminal of that name
+        # Bridges before their devices: one left alone might take the next pseudo-terminal of that name.
+        for process in reversed(self._processes):
             process.stop(9)
 
     def start(self, *arguments: str) -> Process:

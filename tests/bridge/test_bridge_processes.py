@@ -76,7 +76,7 @@ def test_a_few_samples_do_not_wait_for_more(bench, eventually):
     device = bench.virtual()
     bridge = bench.bridge("--rate", "20")
     record_a_curve(bench, bridge, 4)
-    device.stop(signal.SIGKILL)
+    device.stop(signal.SIGTERM)
     bridge.says("device: lost")
     eventually(lambda: bench.server.stored and bench.server.frames(0)[-1:] == bench.sent()[-1:])
 
@@ -246,7 +246,7 @@ def test_a_left_over_recording_is_sent_with_the_samples_that_were_in_no_message_
     bridge = bench.bridge("--rate", "20")
     record_a_curve(bench, bridge, 25)
     bridge.stop(signal.SIGKILL)
-    device.stop(signal.SIGKILL)
+    device.stop(signal.SIGTERM)
     sent = bench.sent()
     bench.server.silent = False
     (old,) = (bench.folder / "spool").glob("*/")

@@ -6,6 +6,7 @@ keys come out of it in time, to be piped into the bridge. Faults can be injected
 
 import os
 import select
+import signal
 import sys
 import time
 import tty
@@ -45,6 +46,7 @@ def run_virtual(settings: VirtualSettings) -> None:
     from tracemesh_bridge.sources.ride import Ride  # late: it needs much that no other command does
 
     ride = Ride(settings)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # not without removing the link: its port is soon another's
     with _Port(settings.link) as port:
         say(f"virtual Morphorider ({settings.shape}, {ride.duration:.0f} s) at {port.name}")
         while not ride.over:
