@@ -6,6 +6,7 @@ keep the neighbours of a left-out sample, whose errors a sensor's filter may hav
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,12 +99,16 @@ def smooth_frames(curves: Sequence[PlacedCurve], samples: NetworkSamples, weight
 
 
 def _search(trials: _Trials, step: float) -> Weights:
-    errors = np.array([trials.error(Weights(0.0, b * step)) for b in _BENDS])
-    best = int(errors.argmin())
+    """Downhill over trial bends from one step on, a parabola through the lowest three, then the stretch."""
+    error = cache(lambda i: trials.error(Weights(0.0, float(_BENDS[i]) * step)))
+    best, before = int(np.flatnonzero(_BENDS == 1.0)[0]), -1
+    while best != before:
+        before = best
+        best = min((i for i in (best, best - 1, best + 1) if 0 <= i < len(_BENDS)), key=error)
     bend = float(_BENDS[best])
     if 0 < best < len(_BENDS) - 1:
-        around = slice(best - 1, best + 2)
-        bend = float(np.exp(_vertex(np.log(_BENDS[around]).tolist(), [float(e) for e in errors[around]])))
+        around = range(best - 1, best + 2)
+        bend = float(np.exp(_vertex([float(np.log(_BENDS[i])) for i in around], [error(i) for i in around])))
     found = {stretch: trials.error(Weights(stretch * step, bend * step)) for stretch in (0.0, *_STRETCHES)}
     return Weights(min(found, key=lambda s: found[s]) * step, bend * step)
 
