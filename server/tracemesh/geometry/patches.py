@@ -146,7 +146,14 @@ def _triangulate(
     points, normals = outline.points, outline.normals
     size = spacing or _perimeter(points) / len(points)
     reason = "its boundary turns the wrong way"
-    for loop in (unrolled, project_to_plane(points, normals), develop(points, normals), map_to_circle(points)):
+    maps = (
+        lambda: unrolled,
+        lambda: project_to_plane(points, normals),
+        lambda: develop(points, normals),
+        lambda: map_to_circle(points),
+    )
+    for plane_map in maps:
+        loop = plane_map()
         try:
             if loop is not None and signed_area(loop) > 0 and _perimeter(loop) < LARGEST_STRETCH * _perimeter(points):
                 return loop, *triangulate_polygon(loop, size * coarsening)

@@ -196,7 +196,9 @@ def _first_chords(loop: Floats, faces: Ints) -> Ints:
     edges = faces[:, [[1, 2], [2, 0], [0, 1]]]
     gap = (edges[..., 1] - edges[..., 0]) % count
     on_loop = (edges < count).all(2)
-    chord = on_loop & (gap != 1) & (gap != count - 1) & ~_acute_ears(loop, edges, gap)
+    chord = on_loop & (gap != 1) & (gap != count - 1)
+    if chord.any():
+        chord &= ~_acute_ears(loop, edges, gap)
     chosen, used = [], set()
     for face, k in np.argwhere(chord):
         a, b = sorted(map(int, edges[face, k]))
