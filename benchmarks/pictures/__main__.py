@@ -21,6 +21,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "resampling": curves.resampling,
     "regression": curves.regression,
     "weights": curves.weights,
+    "reconstruction": curves.reconstruction,
     "positions": curves.positions,
     "bias": curves.bias,
     "uncertainty": curves.uncertainty,

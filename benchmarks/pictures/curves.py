@@ -18,7 +18,7 @@ from tracemesh.geometry.node_inference import InferredNodes, infer_nodes, mark_n
 from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.regression import RegressionSolver
 from tracemesh.geometry.rotations import align_signs, darboux_frames, matrix_to_quaternion, normalized
-from tracemesh.geometry.scan import CurveScan, Scan
+from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.shapes import leaf
 from tracemesh.geometry.simulation import plan_scan, simulate_scan
 
@@ -56,8 +56,8 @@ def cleaning() -> Figure:
     """Samples that are left out, and what the rest says."""
     drawn = figure()
     curve = noisy_scan("leaf").scan.curves[0]
-    quaternion = align_signs(matrix_to_quaternion(_frames(curve)))
-    bad = outliers(curve, quaternion)
+    frames = darboux_frames(normalized(curve.tangent), curve.normal)
+    bad, quaternion = outliers(curve, frames), align_signs(matrix_to_quaternion(frames))
     axes = plane(drawn, 111, f"{bad.sum()} of {len(bad)} samples left out", "distance, m", "quaternion")
     for k, colour in enumerate(CURVES[:4]):
         axes.plot(curve.distance[~bad], quaternion[~bad, k], ".", ms=1.5, color=colour)
@@ -137,6 +137,20 @@ def positions() -> Figure:
     return drawn
 
 
+def reconstruction() -> Figure:
+    """The network of a noisy scan, coloured by the uncertainty of its points."""
+    drawn = figure(5.0)
+    result = reconstruct_network(noisy_scan("leaf").scan)
+    points, uncertainty = result.network.points, 1e3 * result.uncertainty
+    axes = space(drawn, points)
+    draw_network(axes, result.network, GREY, 0.8)
+    dots = axes.scatter(*points.T, s=8, c=uncertainty, vmin=0, depthshade=False, zorder=4)
+    bar = drawn.colorbar(dots, ax=axes, shrink=0.7, pad=0.02)
+    bar.set_label("standard uncertainty, mm", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    return drawn
+
+
 def bias() -> Figure:
     """Error along all curves without and with a heading and a scale per curve."""
     drawn = figure()
@@ -210,10 +224,6 @@ def _sureness(scan: Scan) -> Floats:
             errors = match_errors(scan, true, [meeting])
             rows.append((proposal.confidence, 1e3 * (errors[0] if errors else most)))
     return np.array(rows)
-
-
-def _frames(curve: CurveScan) -> Floats:
-    return darboux_frames(normalized(curve.tangent), curve.normal)
 
 
 def _mark_nodes(axes: Axes, places: Floats) -> None:
