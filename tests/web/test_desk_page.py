@@ -168,7 +168,7 @@ def test_nodes_that_were_not_marked_are_found_and_accepted(server: Server, page:
     for index in (2, 3):
         server.call("PATCH", f"/sessions/{session}/curves/{index}", {"marks": []})
 
-    curves.get_by_role("button", name="Find nodes").click()
+    curves.get_by_role("button", name="Find unmarked nodes").click()
     proposals = curves.get_by_role("list", name="Proposed nodes").get_by_role("listitem")
     expect(proposals).to_have_count(4)
     for left in (3, 2, 1):
