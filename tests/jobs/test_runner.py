@@ -131,6 +131,7 @@ def test_what_cannot_be_reconstructed_says_why(start: Start, database: Database)
     assert (failed.state, failed.error) == ("failed", "session empty has no curve with samples")
 
 
+@on_sqlite
 def test_a_killed_worker_costs_an_attempt_not_the_job(start: Start, database: Database) -> None:
     first = queue(database)
     runner = start()

@@ -7,7 +7,7 @@ import numpy as np
 from tracemesh.errors import ScanError
 from tracemesh.geometry.odometry import COUNTER_RANGE, NOMINAL_SPEED
 from tracemesh.geometry.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
-from tracemesh.geometry.rotations import quaternion_to_matrix
+from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import Floats
 from tracemesh.wire.device import Device, Samples
 
@@ -87,7 +87,7 @@ class CurveDrawing:
         """Unit tangents (n, 3); where they cannot be told the curve goes straight on."""
         if block.tangent is not None:
             return np.array(block.tangent, float)
-        mounting = quaternion_to_matrix(np.array(self.device.mounting))
+        mounting = quaternion_to_matrix(normalized(np.array(self.device.mounting)))
         try:
             if block.quaternion is not None:
                 return frames_from_quaternions(np.array(block.quaternion), mounting)[:, :, 0]

@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from typing import IO
 
 from fastapi import APIRouter, Request, Response
@@ -26,9 +26,10 @@ router = APIRouter(prefix="/sessions", tags=["sessions"])
 @router.get("/{session}/archive", response_class=StreamingResponse)
 def export(session: Identifier, services: UseServices) -> StreamingResponse:
     """Recordings as sent, curves as edited, reconstructions that are done with their files, with checksums."""
-    file = tempfile.SpooledTemporaryFile(SPOOLED)  # noqa: SIM115 - closed when it was sent
-    with services.database.read() as transaction:
+    with ExitStack() as stack, services.database.read() as transaction:
+        file = stack.enter_context(tempfile.SpooledTemporaryFile(SPOOLED))
         write_archive(transaction, services.artifacts, session, file)
+        stack.pop_all()  # closed when it was sent
     headers = {"Content-Disposition": f'attachment; filename="{session}.tracemesh.zip"'}
     return StreamingResponse(_chunks(file), headers=headers, media_type="application/zip")
 
