@@ -92,6 +92,26 @@ def test_a_mounting_turns_the_devices_axes_into_the_frame() -> None:
     np.testing.assert_allclose(scan.curves[0].normal, frames.as_matrix()[:, :, 1], atol=1e-12)
 
 
+def test_a_mounting_may_be_rounded_but_is_a_rotation() -> None:
+    exact, rounded = (
+        scan_from_recordings([recording(*curve(quaternions(5)), mounting=(r, r, 0.0, 0.0))]).curves[0]
+        for r in (0.5**0.5, 0.7071)
+    )
+    np.testing.assert_allclose(rounded.normal, exact.normal, atol=1e-12)
+    with pytest.raises(ValueError, match="quaternion of length 1"):
+        hello(mounting=(0.5, 1e308, 0.5, 0.5))
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e200])
+def test_vectors_whose_length_cannot_be_told_are_refused(size: float) -> None:
+    block = Samples(
+        seq=0, curve=0, first_sample=0, distance=[0.0, 1.0], acceleration=[(0, 0, 1), (0, 0, size)],
+        magnetic=[(0, 1, -1)] * 2,
+    )  # fmt: skip
+    with pytest.raises(ScanError, match="acceleration: sample 2"):
+        scan_from_recordings([recording(*curve(block))])
+
+
 def test_a_gyroscope_is_fused_with_the_vectors() -> None:
     count = 120
     turn = Rotation.from_rotvec(np.linspace(0, 1, count)[:, None] * [0.0, 0.0, 1.0])

@@ -12,7 +12,7 @@ from tracemesh.geometry.closed_curves import from_first_node
 from tracemesh.geometry.fusion import frames_from_imu
 from tracemesh.geometry.odometry import distance_from_ticks, distance_from_time
 from tracemesh.geometry.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
-from tracemesh.geometry.rotations import quaternion_to_matrix
+from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 from tracemesh.geometry.simulation import (
     COUNTS,
@@ -251,7 +251,7 @@ def _orientation(columns: dict[str, Floats], device: Device) -> tuple[Floats, Fl
     """Tangents and normals: as sent, or from quaternions, or from a gyroscope and vectors, or from vectors alone."""
     if {"tangent", "normal"} <= columns.keys():
         return columns["tangent"], columns["normal"]
-    mounting = quaternion_to_matrix(np.array(device.mounting))
+    mounting = quaternion_to_matrix(normalized(np.array(device.mounting)))
     if "quaternion" in columns:
         frames = frames_from_quaternions(columns["quaternion"], mounting)
     elif {"time", "rotation_rate", "acceleration", "magnetic"} <= columns.keys():

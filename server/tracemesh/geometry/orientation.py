@@ -54,11 +54,18 @@ def angles_between(a: Floats, b: Floats) -> Floats:
     return result
 
 
+def _without_direction(vectors: Floats) -> NDArray[np.bool_]:
+    """Which rows (n,) of (n, k) are zero, not finite, or so large or small that their squares are."""
+    size = np.abs(vectors).max(axis=1)
+    result: NDArray[np.bool_] = ~((size > 1e-150) & (size < 1e150))
+    return result
+
+
 def _checked(vectors: Floats, name: str) -> Floats:
     vectors = np.asarray(vectors, float)
     if vectors.ndim != 2 or vectors.shape[1] != 3:
         raise ScanError(f"{name}: wanted an array (n, 3), got one of shape {vectors.shape}")
-    bad = ~(np.isfinite(vectors).all(axis=1) & (np.linalg.norm(np.nan_to_num(vectors), axis=1) > 0))
+    bad = _without_direction(vectors)
     if bad.any():
         raise ScanError(f"{name}: sample {int(bad.argmax()) + 1} is not a finite vector other than zero")
     return vectors
@@ -130,7 +137,7 @@ def frames_from_quaternions(quaternion_wxyz: Floats, mounting: Floats | None = N
     q = np.asarray(quaternion_wxyz, float)
     if q.ndim != 2 or q.shape[1] != 4:
         raise ScanError(f"wanted quaternions (n, 4), got an array of shape {q.shape}")
-    bad = ~(np.isfinite(q).all(axis=1) & (np.linalg.norm(np.nan_to_num(q), axis=1) > 0))
+    bad = _without_direction(q)
     if bad.any():
         raise ScanError(f"quaternion {int(bad.argmax()) + 1} is zero or not finite")
     return _mounted(quaternion_to_matrix(normalized(q)), mounting)
