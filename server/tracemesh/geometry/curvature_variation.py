@@ -80,7 +80,7 @@ def _curvature_laplacian_rows(shape: Shape, weights: Floats) -> sparse.csr_matri
         (values, (np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j]))), (count, count)
     )
     root = sparse.diags(np.where(shape.open_boundary, 0.0, 1 / np.sqrt(mass)))
-    return (root @ stiffness @ sparse.diags(1 / mass) @ _divergence_rows(shape)).tocsr()
+    return sparse.csr_matrix(root @ stiffness @ sparse.diags(1 / mass) @ _divergence_rows(shape))
 
 
 def _divergence_rows(shape: Shape) -> sparse.csr_matrix:

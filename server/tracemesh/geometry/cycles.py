@@ -84,7 +84,7 @@ def turning_angles(points: Floats, normals: Floats) -> NDArray[np.float64]:
     ahead = np.roll(points, -1, axis=0) - points
     behind = np.roll(ahead, 1, axis=0)
     ahead, behind = (e - (e * normals).sum(1, keepdims=True) * normals for e in (ahead, behind))
-    return np.arctan2((np.cross(behind, ahead) * normals).sum(1), (behind * ahead).sum(1))
+    return np.asarray(np.arctan2((np.cross(behind, ahead) * normals).sum(1), (behind * ahead).sum(1)))
 
 
 def _following_sides(network: CurveNetwork) -> dict[HalfSegment, HalfSegment]:
@@ -108,4 +108,4 @@ def _polar_angles(network: CurveNetwork, node: int, sides: list[HalfSegment]) ->
     towards = network.points[[side_points(network, side)[1] for side in sides]] - network.points[node]
     normal = network.normals[node]
     tangent = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    return np.arctan2(towards @ np.cross(normal, tangent), towards @ tangent)
+    return np.asarray(np.arctan2(towards @ np.cross(normal, tangent), towards @ tangent))

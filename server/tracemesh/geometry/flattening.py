@@ -7,12 +7,14 @@ normal cannot give where the patch is steep. All patches are unrolled by one fac
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from tracemesh.geometry.factorisation import Factorisation
 from tracemesh.geometry.laplacian import cotangent_weights
 from tracemesh.geometry.network import Floats, Ints
 
+Complexes = NDArray[np.complex128]
 SMALLEST_WEIGHT = 0.01  # keeps the system definite where triangles are obtuse
 STEPS = 4
 
@@ -39,7 +41,7 @@ def flatten(vertices: Floats, faces: Ints, planar: Floats, pinned: Ints) -> Floa
     return np.column_stack([position.real, position.imag])
 
 
-def _isometric(corners: Floats) -> np.ndarray:
+def _isometric(corners: Floats) -> Complexes:
     """(f, 3) complex, every triangle (f, 3, 3) laid in the plane of complex numbers."""
     side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     length = np.linalg.norm(side, axis=1)
@@ -48,9 +50,9 @@ def _isometric(corners: Floats) -> np.ndarray:
     return np.column_stack([np.zeros(len(side)), length, along + 1j * across])
 
 
-def _opposite(corners: np.ndarray) -> np.ndarray:
+def _opposite(corners: Complexes) -> Complexes:
     """(f, 3) complex, the edge opposite of every corner."""
-    return np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    return np.asarray(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1))
 
 
 def _stiffness(faces: Ints, weights: Floats, count: int) -> sparse.csc_matrix:
@@ -60,7 +62,7 @@ def _stiffness(faces: Ints, weights: Floats, count: int) -> sparse.csc_matrix:
     return sparse.csc_matrix((np.concatenate([-w, -w, w, w]), (rows, columns)), (count, count))
 
 
-def _divergence(faces: Ints, pull: np.ndarray, count: int) -> np.ndarray:
+def _divergence(faces: Ints, pull: Complexes, count: int) -> Complexes:
     """(n,) complex, sum of the pulls (f, 3) along opposite edges at their ends."""
     total = np.zeros(count, complex)
     np.add.at(total, np.roll(faces, -2, axis=1), pull)

@@ -68,4 +68,4 @@ def triangle_areas(corners: Floats) -> Floats:
 
 def lumped_mass(area: Floats, faces: Ints, count: int) -> Floats:
     """(n,) a third of the areas of the faces around every vertex."""
-    return np.bincount(faces.ravel(), np.repeat(area / 3, 3), count)
+    return np.bincount(faces.ravel(), np.repeat(area / 3, 3), count).astype(np.float64)

@@ -1,5 +1,6 @@
 """Triangulation of every patch of a network in a plane (thesis section 4.4.2)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +64,7 @@ def triangulate_patches(
     begin = 0
     for number, outline in enumerate(outlines):
         loop, inside, triangles = _triangulate(
-            complex_.network, outline, spacing, coarsening, unrolled and unrolled[number]
+            complex_.network, outline, spacing, coarsening, unrolled[number] if unrolled else None
         )
         planar += [loop, inside]
         faces.append(triangles + begin)
@@ -146,7 +147,7 @@ def _triangulate(
     points, normals = outline.points, outline.normals
     size = spacing or _perimeter(points) / len(points)
     reason = "its boundary turns the wrong way"
-    maps = (
+    maps: tuple[Callable[[], Floats | None], ...] = (
         lambda: unrolled,
         lambda: project_to_plane(points, normals),
         lambda: develop(points, normals),

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from tracemesh.geometry.curvature import normalised
-from tracemesh.geometry.network import CurveNetwork, Floats, Segment
+from tracemesh.geometry.network import CurveNetwork, Floats, Ints, Segment
 
 
 def subdivided(network: CurveNetwork, spacing: float) -> CurveNetwork:
@@ -28,15 +28,16 @@ def subdivided(network: CurveNetwork, spacing: float) -> CurveNetwork:
     return replace(network, points=np.vstack(points), normals=np.vstack(normals), segments=tuple(segments))
 
 
-def _points_between(network: CurveNetwork, segment: Segment, spacing: float) -> tuple[Floats, Floats, np.ndarray]:
+def _points_between(network: CurveNetwork, segment: Segment, spacing: float) -> tuple[Floats, Floats, Ints]:
     """Positions and normals of the new points of one segment, and the number of parts of every edge."""
     points, normals = network.points[segment.points], network.normals[segment.points]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     parts = np.maximum(np.ceil(lengths / spacing - 1e-6), 1).astype(np.int64)
     knots = np.concatenate([[0.0], np.cumsum(lengths)])
-    ends = "periodic" if segment.points[0] == segment.points[-1] else "not-a-knot"
-    spline = CubicSpline(knots, np.column_stack([points, normals]), bc_type=ends)
+    values = np.column_stack([points, normals])
+    closed = segment.points[0] == segment.points[-1]
+    spline = CubicSpline(knots, values, bc_type="periodic") if closed else CubicSpline(knots, values)
     step = np.concatenate([np.arange(1, p) / p for p in parts])
     at = np.repeat(knots[:-1], parts - 1) + step * np.repeat(lengths, parts - 1)
-    values = spline(at)
+    values = np.asarray(spline(at))
     return values[:, :3], normalised(values[:, 3:]), parts

@@ -4,6 +4,8 @@ Interior points of a hexagonal lattice, relaxed by smoothing: larger smallest an
 thesis uses (Triangle, non-commercial) and which also splits the boundary.
 """
 
+from typing import Any
+
 import numpy as np
 import pythoncdt
 from scipy.spatial import cKDTree
@@ -77,7 +79,8 @@ def _angles(start: Floats, end: Floats, tips: Floats) -> Floats:
     of it.
     """
     a, b, c = (complex(*start), complex(*end), tips[:, 0] + 1j * tips[:, 1])
-    return np.min([np.angle((c - a) / (b - a)), np.angle((a - b) / (c - b)), np.angle((b - c) / (a - c))], axis=0)
+    angles = np.angle([(c - a) / (b - a), (a - b) / (c - b), (b - c) / (a - c)])
+    return np.asarray(angles.min(0))
 
 
 def _graded_lattice(loop: Floats, fixed: Floats, spacing: float) -> Floats:
@@ -124,12 +127,15 @@ def _constrained_delaunay(count: int, points: Floats) -> Ints:
     inside.
     """
     corners = np.arange(count, dtype=np.uint32)
+    # Arrays are buffers, which numpy's types say only from Python 3.12 on.
+    vertices: Any = points
+    edges: Any = np.column_stack([corners, np.roll(corners, -1)])
     mesh = pythoncdt.Triangulation(
         pythoncdt.VertexInsertionOrder.AUTO, pythoncdt.IntersectingConstraintEdges.NOT_ALLOWED, 0.0
     )
     try:
-        mesh.insert_vertices(points)
-        mesh.insert_edges(np.column_stack([corners, np.roll(corners, -1)]))
+        mesh.insert_vertices(vertices)
+        mesh.insert_edges(edges)
     except RuntimeError as error:
         raise SurfaceError(f"the polygon crosses or touches itself: {error}") from None
     mesh.erase_outer_triangles()
@@ -199,7 +205,8 @@ def _first_chords(loop: Floats, faces: Ints) -> Ints:
     chord = on_loop & (gap != 1) & (gap != count - 1)
     if chord.any():
         chord &= ~_acute_ears(loop, edges, gap)
-    chosen, used = [], set()
+    chosen: list[tuple[int, int]] = []
+    used: set[int] = set()
     for face, k in np.argwhere(chord):
         a, b = sorted(map(int, edges[face, k]))
         beside = set(np.flatnonzero((faces == a).any(1) & (faces == b).any(1)).tolist())
