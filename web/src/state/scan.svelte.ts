@@ -48,6 +48,7 @@ export class ScanStore {
   #live: LiveSocket | undefined;
   #stopSource: StopSource = () => undefined;
   #wakeLock: WakeLockSentinel | undefined;
+  #opened: Promise<void> = Promise.resolve();
   #committed = 0;
   #readings = 0;
   #timer: ReturnType<typeof setInterval> | undefined;
@@ -61,7 +62,12 @@ export class ScanStore {
   }
 
   /** Open the session: what an earlier visit left in the spool is sent at once. */
-  async open(): Promise<void> {
+  open(): Promise<void> {
+    this.#opened = this.#open();
+    return this.#opened;
+  }
+
+  async #open(): Promise<void> {
     try {
       this.name = (await this.api.session(this.session)).name;
     } catch (error) {
@@ -98,6 +104,7 @@ export class ScanStore {
         this.problem = words;
       },
     });
+    await this.#opened;
     const id = newName(source.kind);
     if (!this.#recorder) await this.#resume(freshRecording(id, { id, ...source.device }));
     await this.stayAwake();
@@ -111,9 +118,10 @@ export class ScanStore {
   }
 
   async start(): Promise<void> {
+    if (!this.#recorder) return;
     this.marks = [];
     this.scanning = true;
-    await this.#recorder?.start(this.boundary);
+    await this.#recorder.start(this.boundary);
   }
 
   async stop(): Promise<void> {
