@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 @router.websocket("/ingest")
 async def ingest(socket: WebSocket, services: UseServices) -> None:
-    """The device protocol: see docs/protocol.md."""
+    """The device protocol: see docs/api.md."""
     await socket.accept()
     device = _Connection(socket, services)
     try:

@@ -16,7 +16,7 @@ router = APIRouter()
 
 @router.websocket("/sessions/{session}/live")
 async def live(socket: WebSocket, session: Identifier, services: UseServices) -> None:
-    """`live.snapshot` first, then what changes; see docs/protocol.md."""
+    """`live.snapshot` first, then what changes; see docs/api.md."""
     await socket.accept()
     try:
         await run_in_threadpool(_check, services, session)
