@@ -8,7 +8,7 @@ from typing import Any
 from platformdirs import user_data_path
 from pydantic import TypeAdapter, ValidationError
 
-from tracemesh.wire.base import Identifier, Quaternion
+from tracemesh.wire.base import Identifier, UnitQuaternion
 from tracemesh.wire.device import Device, Wheel
 from tracemesh_bridge.framing import FrameLayout, read_layout
 from tracemesh_bridge.keys import KEYS_HELP
@@ -97,5 +97,6 @@ positive = checked(lambda text: _number(text, zero=False), "a number above 0")
 not_negative = checked(lambda text: _number(text, zero=True), "a number from 0 up")
 identifier = checked(TypeAdapter(Identifier).validate_python, "up to 64 letters, digits, _ and -")
 quaternion = checked(
-    lambda text: TypeAdapter(Quaternion).validate_python(text.split(",")), "four numbers w,x,y,z separated by commas"
+    lambda text: TypeAdapter(UnitQuaternion).validate_python(text.split(",")),
+    "a rotation: four numbers w,x,y,z separated by commas, of length 1",
 )

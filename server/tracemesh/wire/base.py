@@ -1,15 +1,25 @@
 """What all messages share."""
 
+import math
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 PROTOCOL_VERSION = 1
 """Version of the device protocol that this code speaks."""
 
+
+def _of_length_one(quaternion: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    if not abs(math.hypot(*quaternion) - 1) < 1e-3:
+        raise ValueError(f"wanted a quaternion of length 1, got {quaternion}")
+    return quaternion
+
+
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 """[w, x, y, z], device to world (ENU)."""
+UnitQuaternion = Annotated[Quaternion, AfterValidator(_of_length_one)]
+"""[w, x, y, z], a rotation, rounded to at least three decimals."""
 Count = Annotated[int, Field(ge=0, le=2**53 - 1)]
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 """Chosen by whoever creates the thing; safe in a URL and in a file name."""

@@ -11,12 +11,11 @@ already is ignored, one that comes too early is refused with the number that was
 sent, as sent: `hello` and the numbered messages in order, one JSON object a line.
 """
 
-import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, TypeAdapter, field_validator, model_validator
+from pydantic import Field, TypeAdapter, model_validator
 
-from tracemesh.wire.base import PROTOCOL_VERSION, Count, Identifier, Message, Name, Quaternion, Vector
+from tracemesh.wire.base import PROTOCOL_VERSION, Count, Identifier, Message, Name, Quaternion, UnitQuaternion, Vector
 
 MAX_SAMPLES = 2000
 """Most samples that one message may carry."""
@@ -43,18 +42,11 @@ class Device(Message):
     kind: Identifier = Field(description="morphorider, phone, sensorserver, file, ...")
     name: Name = ""
     wheel: Wheel | None = Field(default=None, description="present when the device counts wheel ticks")
-    mounting: Quaternion = Field(
+    mounting: UnitQuaternion = Field(
         default=(1.0, 0.0, 0.0, 0.0),
         description="[w, x, y, z]: turns the axes (tangent, normal, B) into the device's own axes",
     )
     reference: Reference = Reference()
-
-    @field_validator("mounting")
-    @classmethod
-    def _unit(cls, mounting: Quaternion) -> Quaternion:
-        if not abs(math.hypot(*mounting) - 1) < 1e-3:
-            raise ValueError(f"wanted a quaternion of length 1, got {mounting}")
-        return mounting
 
 
 class Hello(Message):
