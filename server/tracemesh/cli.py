@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from datetime import date
@@ -335,6 +336,7 @@ def _serve(chosen: argparse.Namespace) -> int:
 def _demo(chosen: argparse.Namespace) -> int:
     from tracemesh.demo import headless, watch
 
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the demo's own processes end with it
     if chosen.headless:
         return headless(chosen.out, chosen.port)
     return watch(chosen.port)

@@ -106,7 +106,10 @@ class Room:
 
     async def _read_again(self) -> None:
         self._stale = False
-        self._tracker, self._reconstruction = await self._load(self.session)
+        told = self._reconstruction
+        self._tracker, stored = await self._load(self.session)
+        if self._reconstruction is told:  # else there was news while reading
+            self._reconstruction = stored
         self._loaded.set()
         self._unsolved.set()
         for client in self.clients:
