@@ -51,44 +51,44 @@ def triangulate_patches(
 ) -> PatchMesh:
     """Triangulate every face of a cell complex.
 
-    spacing: edge length inside, m; None takes each patch's own boundary spacing. coarsening: factor on it. last: a
-    triangulation with vertices
-    (n, 3)
-    whose patches are unrolled to be triangulated again; None projects along average normals.
+    spacing: edge length inside, m; None takes each patch's own boundary spacing. coarsening: factor on it.
+    last: a triangulation with vertices (n, 3) whose patches are unrolled to be triangulated again; None projects along
+    average normals. Raises SurfaceError, naming the patch, if one cannot be triangulated.
     """
-    fixed = count = len(complex_.network.points)
-    outlines = outlines_of(complex_)
-    count = max(count, 1 + max(int(outline.vertex.max()) for outline in outlines))
-    unrolled = None if last is None else _unrolled_loops(outlines, *last)
-    planar, faces, vertex, patch, starts, lift = [], [], [], [], [], [np.zeros((count, 3))]
-    begin = 0
-    for number, outline in enumerate(outlines):
-        loop, inside, triangles = _triangulate(
-            complex_.network, outline, spacing, coarsening, unrolled[number] if unrolled else None
-        )
-        planar += [loop, inside]
-        faces.append(triangles + begin)
-        vertex += [outline.vertex, count + np.arange(len(inside))]
-        patch.append(np.full(len(triangles), number))
-        starts.append(begin)
-        lift.append(np.tile(_lift(outline), (len(inside), 1)))
-        count += len(inside)
-        begin += len(loop) + len(inside)
-    mesh = PatchMesh(
-        np.vstack(planar),
-        np.vstack(faces),
-        np.concatenate(vertex),
-        np.concatenate(patch),
-        np.array(starts),
-        np.vstack(lift),
-        fixed,
-        count,
-    )
+    network, outlines = complex_.network, outlines_of(complex_)
+    unrolled = [None] * len(outlines) if last is None else _unrolled_loops(outlines, *last)
+    pieces = [
+        _triangulate(network, outline, spacing, coarsening, loop)
+        for outline, loop in zip(outlines, unrolled, strict=True)
+    ]
+    mesh = _numbered(outlines, pieces, len(network.points))
     _check_manifold(mesh.faces)
     return mesh
 
 
+def _numbered(outlines: list[Outline], pieces: list[tuple[Floats, Floats, Ints]], fixed: int) -> PatchMesh:
+    """Patches as one mesh: the network's points, then those of slits, then those inside of every patch."""
+    count = max(fixed, 1 + max(int(outline.vertex.max()) for outline in outlines))
+    inside = [len(points) for _, points, _ in pieces]
+    size = [len(loop) + m for (loop, _, _), m in zip(pieces, inside, strict=True)]
+    starts = np.concatenate([[0], np.cumsum(size)[:-1]])
+    first = count + np.concatenate([[0], np.cumsum(inside)[:-1]])
+    vertex = [np.append(o.vertex, k + np.arange(m)) for o, k, m in zip(outlines, first, inside, strict=True)]
+    lift = [np.tile(_lift(o), (m, 1)) for o, m in zip(outlines, inside, strict=True)]
+    return PatchMesh(
+        planar=np.vstack([part for loop, points, _ in pieces for part in (loop, points)]),
+        planar_faces=np.vstack([faces + k for (_, _, faces), k in zip(pieces, starts, strict=True)]),
+        vertex=np.concatenate(vertex),
+        patch=np.repeat(np.arange(len(pieces)), [len(faces) for _, _, faces in pieces]),
+        starts=starts,
+        lift=np.vstack([np.zeros((count, 3)), *lift]),
+        fixed=fixed,
+        count=count + sum(inside),
+    )
+
+
 def _check_manifold(faces: Ints) -> None:
+    """Acute corners on both sides of a curve may be cut along the same chord."""
     edges, count = unique_edges(faces)
     if count.max() > 2:
         a, b = edges[count.argmax()]
@@ -134,7 +134,7 @@ def _lift(outline: Outline) -> Floats:
     return normalised(np.cross(outline.points, np.roll(outline.points, -1, axis=0)).sum(0))
 
 
-def _unrolled_loops(outlines: list[Outline], patches: PatchMesh, vertices: Floats) -> list[Floats]:
+def _unrolled_loops(outlines: list[Outline], patches: PatchMesh, vertices: Floats) -> list[Floats | None]:
     """Boundaries of all patches, unrolled from space into the plane."""
     planar = flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)
     return [planar[start : start + len(o.points)] for start, o in zip(patches.starts, outlines, strict=True)]

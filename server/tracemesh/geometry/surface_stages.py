@@ -24,7 +24,7 @@ from tracemesh.geometry.subdivision import subdivided
 Progress = Callable[[str, float], None]
 COARSE = 3.0  # edges inside the patches of the first solve, which only serves to unroll them, over those of the mesh
 LARGEST_UNROLLS = 4
-LARGEST_AUTOMATIC = 50_000  # vertices; the factorisation of the refinement grows faster than the mesh
+LARGEST_AUTOMATIC = 20_000  # vertices; the factorisation of the refinement grows faster than the mesh
 FARTHEST = 2.0  # distance of a vertex from the middle of the network, over its diagonal
 REBUILDS = 2  # solves in the metric of the last one; more change little
 
