@@ -168,3 +168,24 @@ def test_a_deleted_session_cuts_its_devices_off(server: Any, ride: Ride, line: L
         pass
     assert answer["code"] == "unknown"
     assert server.http.get(f"/sessions/{session}").status_code == 404
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        "",
+        "null",
+        "[" * 100_000,
+        '{"type": "node", "seq": 1e999, "curve": 0, "sample": 0, "node": 0}',
+        '{"type": "node", "seq": 99999999999999999999, "curve": 0, "sample": 0, "node": 0}',
+        '{"type": "samples", "seq": 0, "curve": 0, "first_sample": 0, "distance": [NaN], "tangent": [[1, 0, 0]]}',
+        '{"type":\n"node"}',
+        b"\x00\xff\xfe",
+    ],
+)
+def test_hostile_bytes_are_refused_and_nothing_else_happens(server: Any, ride: Ride, payload: str | bytes) -> None:
+    session = server.new_session()
+    rider = ride("hostile", session)
+    rider.socket.send(payload)
+    assert rider.receive()["code"] == "malformed"
+    assert server.http.get(f"/sessions/{session}/recordings/hostile").text == rider.hello + "\n"
