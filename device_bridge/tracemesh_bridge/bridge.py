@@ -124,7 +124,7 @@ class Bridge:
                 self._spool.trouble = str(error)
             self._tell_trouble()
             self._uplink.wake()
-            self._console.status(self._status())
+            self._console.status(self._status)
             await asyncio.sleep(TICK)
 
     def _take(self, reading: Reading) -> None:

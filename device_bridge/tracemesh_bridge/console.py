@@ -23,10 +23,10 @@ class Console:
         clear = "\r\x1b[K" if self._status else ""
         _write(f"{clear}{words}\n{self._line()}")
 
-    def status(self, words: str) -> None:
-        """Rewrite the last line; nothing without a terminal."""
+    def status(self, words: Callable[[], str]) -> None:
+        """Rewrite the last line; without a terminal nobody asks for the words."""
         if self._terminal:
-            self._status = words
+            self._status = words()
             _write(f"\r\x1b[K{self._line()}")
 
     def _line(self) -> str:

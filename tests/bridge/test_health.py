@@ -1,4 +1,6 @@
 import math
+import sys
+import threading
 
 import pytest
 from hypothesis import given
@@ -72,3 +74,27 @@ def test_a_link_says_one_line_when_it_goes_down_and_one_when_it_is_up():
     link.to(LinkState.LIVE, "port")
     assert said == ["device: searching: no port", "device: live: port", "device: stale: silent",
                     "device: searching: gone", "device: live: port"]  # fmt: skip
+
+
+def test_it_can_be_looked_at_while_a_source_tells_it_more():
+    health, stop = Health(), threading.Event()
+
+    def tell():
+        number = 0
+        while not stop.is_set():
+            number += 1
+            health.take(Reading(received=number / 1000, acceleration=(0, 0, 1), magnetic=(1, 0, -1)))
+            health.fault(f"kind {number}")
+
+    source = threading.Thread(target=tell)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        source.start()
+        for _ in range(30):
+            health.describe(1.0)
+    finally:
+        stop.set()
+        source.join()
+        sys.setswitchinterval(interval)
+    assert sum(health.faults.values()) == health.received > 0

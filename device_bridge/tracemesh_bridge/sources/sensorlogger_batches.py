@@ -79,7 +79,8 @@ class Reorder:
         given_up: list[Batch] = []
         while self._early:
             missing = min(self._early) - self._next
-            self._health.faults["missing"] += missing
+            if missing:
+                self._health.fault("missing", missing)
             self._next += missing
             given_up += self._ready()
         return given_up
