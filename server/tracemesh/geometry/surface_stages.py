@@ -112,8 +112,9 @@ def refined_surface(
 ) -> tuple[Floats, Floats, dict[str, object]]:
     """Vertices and normals, refined if that is wanted and convincing, and what the report says about it."""
     report: dict[str, object] = {"mode": mode, "used": False}
-    nothing_free = patches.count == patches.fixed
-    if mode == "off" or nothing_free or (mode == "auto" and patches.count > LARGEST_AUTOMATIC):
+    if mode == "auto" and patches.count > LARGEST_AUTOMATIC:
+        return vertices, normals, report | {"skipped": f"more than {LARGEST_AUTOMATIC} vertices"}
+    if mode == "off" or patches.count == patches.fixed:
         return vertices, normals, report
     stages.begin("refinement", 0.5)
     refined = refine(vertices, normals, patches.faces, patches.patch, patches.fixed)
