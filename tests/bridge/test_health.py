@@ -84,14 +84,16 @@ def test_it_can_be_looked_at_while_a_source_tells_it_more():
         while not stop.is_set():
             number += 1
             health.take(Reading(received=number / 1000, acceleration=(0, 0, 1), magnetic=(1, 0, -1)))
-            health.fault(f"kind {number}")
+            health.fault(f"kind {number % 7}")
 
     source = threading.Thread(target=tell)
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     try:
         source.start()
-        for _ in range(30):
+        while health.received < 3000:
+            pass
+        for _ in range(50):
             health.describe(1.0)
     finally:
         stop.set()
