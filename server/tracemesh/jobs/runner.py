@@ -65,9 +65,9 @@ class JobRunner:
         if attempt is None:
             return
         settings = self._settings
-        future = slot.submit(work, settings.resolved_database_url, settings.artifact_dir, identifier, attempt)
-        self._watch(future, identifier)
         try:
+            future = slot.submit(work, settings.resolved_database_url, settings.artifact_dir, identifier, attempt)
+            self._watch(future, identifier)
             future.result()
         except BrokenProcessPool:
             slot.renew()

@@ -5,6 +5,7 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import wait
 from typing import TypeVar
 
@@ -12,32 +13,46 @@ T = TypeVar("T")
 
 
 class Slot:
-    """Runs one function after another in a process of its own, started when it is first needed."""
+    """Runs one function after another in a process of its own, started when it is first needed; from any thread."""
 
     def __init__(self) -> None:
         """No process yet."""
         self._pool: ProcessPoolExecutor | None = None
+        self._closed = False
+        self._lock = threading.Lock()
 
     def submit(self, function: Callable[..., T], *arguments: object) -> Future[T]:
-        """Run in the process; the future raises BrokenProcessPool when the process is lost."""
-        if self._pool is None:
-            spawn = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_end_with_parent)
-        return self._pool.submit(function, *arguments)
+        """Run in the process; the future raises BrokenProcessPool when the process is lost.
+
+        Raises BrokenProcessPool when the slot is closed.
+        """
+        with self._lock:
+            if self._closed:
+                raise BrokenProcessPool("the slot is closed")
+            if self._pool is None:
+                spawn = multiprocessing.get_context("spawn")
+                self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_end_with_parent)
+            return self._pool.submit(function, *arguments)
 
     def renew(self) -> None:
         """The process was lost; the next submission starts another one."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=False)
-            self._pool = None
+        pool = self._taken()
+        if pool is not None:
+            pool.shutdown(wait=False)
 
     def close(self) -> None:
-        """End the process at once; what it was doing is left undone."""
-        if self._pool is not None:
-            for process in list((self._pool._processes or {}).values()):
+        """End the process at once, for good; what it was doing is left undone."""
+        self._closed = True
+        pool = self._taken()
+        if pool is not None:
+            for process in list((pool._processes or {}).values()):
                 process.terminate()
-            self._pool.shutdown(wait=True, cancel_futures=True)
-            self._pool = None
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _taken(self) -> ProcessPoolExecutor | None:
+        with self._lock:
+            pool, self._pool = self._pool, None
+            return pool
 
 
 def _end_with_parent() -> None:
