@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from tracemesh.geometry.network import Floats, Ints
+from tracemesh.geometry.rotations import normalized
 
 SurfaceMap = Callable[[Floats], tuple[Floats, Floats]]
 """(n, d) points of the domain -> (n, 3) points in m and (n, 3, d) Jacobians, d = 2 or 3."""
@@ -103,7 +104,8 @@ class ShapeCurve:
 
     def _speed(self, parameter: Floats) -> Floats:
         domain, along = self.path.at(parameter)
-        return np.linalg.norm(np.einsum("nij,nj->ni", self.surface(domain)[1], along), axis=1)
+        speed: Floats = np.linalg.norm(np.einsum("nij,nj->ni", self.surface(domain)[1], along), axis=1)
+        return speed
 
     @cached_property
     def _arc_length(self) -> tuple[Floats, Floats]:
@@ -134,7 +136,7 @@ def _hermite(x: Floats, knots: Floats, values: Floats, slopes: Floats) -> Floats
 def surface_normals(domain: Floats, jacobians: Floats) -> Floats:
     """Outward unit normals (n, 3) of a mapped disk (d = 2) or a mapped unit sphere (d = 3)."""
     if domain.shape[1] == 2:
-        normal = np.cross(jacobians[:, :, 0], jacobians[:, :, 1])
-    else:  # a sphere's normal is its own point, carried over by the cofactors of the Jacobian
-        normal = np.linalg.solve(jacobians.transpose(0, 2, 1), domain[:, :, None])[:, :, 0]
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        return normalized(np.cross(jacobians[:, :, 0], jacobians[:, :, 1]))
+    # a sphere's normal is its own point, carried over by the cofactors of the Jacobian
+    carried: Floats = np.linalg.solve(jacobians.transpose(0, 2, 1), domain[:, :, None])[:, :, 0]
+    return normalized(carried)
