@@ -138,5 +138,5 @@ def surface_normals(domain: Floats, jacobians: Floats) -> Floats:
     if domain.shape[1] == 2:
         return normalized(np.cross(jacobians[:, :, 0], jacobians[:, :, 1]))
     # a sphere's normal is its own point, carried over by the cofactors of the Jacobian
-    carried: Floats = np.linalg.solve(jacobians.transpose(0, 2, 1), domain[:, :, None])[:, :, 0]
-    return normalized(carried)
+    carried = np.linalg.solve(jacobians.transpose(0, 2, 1), domain[:, :, None])[:, :, 0]
+    return normalized(np.asarray(carried, np.float64))
