@@ -1,5 +1,6 @@
 """Nodes that were found, over HTTP."""
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,21 @@ def test_samples_are_those_that_were_sent_though_a_closed_curve_is_first_marked_
     (marked,) = (p for p in proposals if p["node"] == node)
     assert truth.nodes_at(marked, 1e-3) == [node]
     assert sorted(truth.nodes_at(p, 0.02) for p in proposals) == sorted([n] for n in truth.nodes)
+
+
+def test_a_job_finds_nodes_when_it_is_asked_to(server: Any, session: str) -> None:
+    set_marks(server, session, {})
+    ended = []
+    for parameters in ({"surface": False}, {"surface": False, "infer_nodes": True}):
+        job = server.http.post(f"/sessions/{session}/reconstructions", json=parameters).json()
+        while job["state"] in ("queued", "running"):
+            time.sleep(0.05)
+            job = server.http.get(f"/reconstructions/{job['id']}").json()
+        ended.append(job)
+    assert [job["state"] for job in ended] == ["failed", "done"]
+    assert "have the nodes found" in ended[0]["error"]
+    report = server.http.get(f"/reconstructions/{ended[1]['id']}/report.json").json()
+    assert sum(p["used"] for p in report["nodes"]["proposals"]) == 12
 
 
 def test_where_there_is_nothing_to_begin_with_it_says_so(server: Any, ride: Any, line: Any) -> None:
