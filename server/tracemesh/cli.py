@@ -258,10 +258,9 @@ def _nodes_in_words(nodes: InferredNodes) -> str:
     marked = sum(p.node is not None for p in used)
     unlikely = len(nodes.proposals) - len(used)
     least = min((p.confidence for p in used), default=0.0)
-    return (
-        f"{len(used)} nodes, {marked} of them marked, {len(used) - marked} found with a confidence of at least "
-        f"{least:.2f}; {unlikely} left out, being no likelier than {LEAST_CONFIDENCE}"
-    )
+    rest = f"; {unlikely} left out, being no likelier than {LEAST_CONFIDENCE}" if unlikely else ""
+    found = f"{len(used) - marked} found with a confidence of at least {least:.2f}"
+    return f"{len(used)} nodes, {marked} of them marked, {found}{rest}"
 
 
 def _surface(chosen: argparse.Namespace) -> int:
