@@ -9,13 +9,12 @@ from time import perf_counter
 from tracemesh.errors import PiecesError, ScanError
 from tracemesh.formats.meshes import write_mesh
 from tracemesh.formats.networks import write_network
-from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
 from tracemesh.geometry.odometry import NOMINAL_SPEED
 from tracemesh.geometry.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
-from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.scan import Scan, curve_name
 from tracemesh.geometry.sketch import give_lengths
 from tracemesh.geometry.surface import SurfaceParameters, span_surface
 from tracemesh.wire.resources import ReconstructionParameters

@@ -72,18 +72,18 @@ def test_closed_surface_needs_no_boundary() -> None:
 
 
 def test_forgotten_boundary_tag_names_the_segment() -> None:
-    with pytest.raises(NetworkError, match=r"segment 1-2 of curve 0 lies beside an opening.*mark it as boundary"):
+    with pytest.raises(NetworkError, match=r"segment 1-2 of curve 1 lies beside an opening.*mark it as boundary"):
         cell_complex(with_segment(flat_window(), 1, boundary=False))
 
 
 def test_wrong_boundary_tag_names_the_segment() -> None:
-    with pytest.raises(NetworkError, match=r"segment 1-4 of curve 1 is marked as boundary.*mark it as interior"):
+    with pytest.raises(NetworkError, match=r"segment 1-4 of curve 2 is marked as boundary.*mark it as interior"):
         cell_complex(with_segment(flat_window(), 8, boundary=True))
 
 
 def test_dangling_segment_is_named() -> None:
     network = flat_window(1)
-    with pytest.raises(NetworkError, match="segment 4-5 of curve 2 begins where no other curve meets it"):
+    with pytest.raises(NetworkError, match="segment 4-5 of curve 3 begins where no other curve meets it"):
         cell_complex(replace(network, segments=(*network.segments[:8], network.segments[11])))
 
 
@@ -122,5 +122,5 @@ def test_rings_are_paired_across_the_band_between_them() -> None:
 
 
 def test_curves_that_nothing_connects_are_named() -> None:
-    with pytest.raises(NetworkError, match="closed curve 0 and closed curve 1: connect them"):
+    with pytest.raises(NetworkError, match="closed curve 1 and closed curve 2: connect them"):
         cell_complex(rings([(1, 0, False), (1, 50, False)], radial))

@@ -126,5 +126,5 @@ def test_quality_of_an_octahedron() -> None:
     vertices, faces = icosphere(0)
     quality = mesh_quality(vertices, faces, vertices)
     assert (quality.euler_number, quality.boundary_loops, quality.inverted_faces) == (2, 0, 0)
-    assert quality.min_angle == pytest.approx(60)
+    assert quality.min_angle_deg == pytest.approx(60)
     assert mesh_quality(vertices, faces[1:], vertices).boundary_loops == 1

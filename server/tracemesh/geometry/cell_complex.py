@@ -13,6 +13,7 @@ from tracemesh.errors import NetworkError
 from tracemesh.geometry.bridges import partners
 from tracemesh.geometry.cycles import Cycle, loop_points, trace_cycles
 from tracemesh.geometry.network import CurveNetwork, Ints, Segment
+from tracemesh.geometry.scan import curve_name
 
 # An opening seen from outside turns by -2 pi if the surface around it is flat, and by more the more it curves inwards.
 # Below this, rad, a cycle of an untagged network is taken for an opening: a face would need more curvature than a
@@ -76,9 +77,9 @@ def segment_name(network: CurveNetwork, index: int) -> str:
     segment = network.segments[index]
     numbers = {int(point): number for number, point in enumerate(network.nodes)}
     if segment.points[0] == segment.points[-1] and int(segment.points[0]) not in numbers:
-        return f"closed curve {segment.curve}"
+        return f"closed {curve_name(segment.curve)}"
     first, last = (numbers.get(int(segment.points[end]), "?") for end in (0, -1))
-    return f"segment {first}-{last} of curve {segment.curve}"
+    return f"segment {first}-{last} of {curve_name(segment.curve)}"
 
 
 def _check_arrays(network: CurveNetwork) -> None:

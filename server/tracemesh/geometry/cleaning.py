@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tracemesh.errors import ScanError
 from tracemesh.geometry.orientation import angles_between
 from tracemesh.geometry.rotations import align_signs, darboux_frames, matrix_to_quaternion, normalized
-from tracemesh.geometry.scan import CurveScan
+from tracemesh.geometry.scan import CurveScan, curve_name
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,11 +42,6 @@ class CleanCurve:
     index: int
     samples: int
     dropped: int
-
-
-def curve_name(index: int) -> str:
-    """What messages call the curve at an index of the scan: people count from one."""
-    return f"curve {index + 1}"
 
 
 def _check(curve: CurveScan, name: str) -> None:

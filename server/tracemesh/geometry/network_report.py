@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.closing import Closing
 from tracemesh.geometry.samples import Layout
+from tracemesh.geometry.scan import curve_name
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.cleaning import CleanCurve, curve_name
+from tracemesh.geometry.cleaning import CleanCurve
 from tracemesh.geometry.rotations import align_signs
 from tracemesh.geometry.samples import Layout
+from tracemesh.geometry.scan import curve_name
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

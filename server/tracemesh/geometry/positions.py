@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from tracemesh.errors import PiecesError
-from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.samples import Layout
+from tracemesh.geometry.scan import curve_name
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

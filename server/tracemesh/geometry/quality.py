@@ -12,8 +12,8 @@ from tracemesh.geometry.network import Floats, Ints
 
 @dataclass(frozen=True)
 class MeshQuality:
-    """vertices, faces, euler_number, boundary_loops: counts. min_angle, mean_angle: of all triangles' smallest angles,
-    degrees.
+    """vertices, faces, euler_number, boundary_loops: counts. min_angle_deg, mean_angle_deg: of all triangles' smallest
+    angles, degrees.
 
     inverted_faces: triangles that look more than 90 degrees away from the normals at their corners.
     """
@@ -22,8 +22,8 @@ class MeshQuality:
     faces: int
     euler_number: int
     boundary_loops: int
-    min_angle: float
-    mean_angle: float
+    min_angle_deg: float
+    mean_angle_deg: float
     inverted_faces: int
 
 
@@ -36,8 +36,8 @@ def mesh_quality(vertices: Floats, faces: Ints, normals: Floats) -> MeshQuality:
         faces=len(faces),
         euler_number=len(np.unique(faces)) - len(edges) + len(faces),
         boundary_loops=_component_count(edges[count == 1]),
-        min_angle=float(np.degrees(smallest.min())),
-        mean_angle=float(np.degrees(smallest.mean())),
+        min_angle_deg=float(np.degrees(smallest.min())),
+        mean_angle_deg=float(np.degrees(smallest.mean())),
         inverted_faces=int(inverted_faces(vertices, faces, normals).sum()),
     )
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracemesh.errors import ScanError
 from tracemesh.geometry.assembly import assemble_network, per_point
-from tracemesh.geometry.cleaning import CleanCurve, clean_curves, curve_name
+from tracemesh.geometry.cleaning import CleanCurve, clean_curves
 from tracemesh.geometry.closing import Closed, close_network
 from tracemesh.geometry.energy import Weights
 from tracemesh.geometry.network import CurveNetwork
@@ -22,7 +22,7 @@ from tracemesh.geometry.quadrature import edge_vectors
 from tracemesh.geometry.regression import Regression, RegressionSolver
 from tracemesh.geometry.resampling import resample
 from tracemesh.geometry.samples import Layout, NetworkSamples
-from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.scan import Scan, curve_name
 from tracemesh.geometry.sketch import with_lengths
 from tracemesh.geometry.uncertainty import point_uncertainty
 from tracemesh.geometry.weights import choose_weights

@@ -49,3 +49,8 @@ class Scan:
     """All curves scanned on one object; nodes with the same number are the same point of the object."""
 
     curves: tuple[CurveScan, ...]
+
+
+def curve_name(index: int) -> str:
+    """What messages call the curve at an index of the scan: people count from one."""
+    return f"curve {index + 1}"

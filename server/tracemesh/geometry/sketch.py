@@ -18,12 +18,11 @@ from scipy.sparse import coo_array, csc_array, diags_array, vstack
 from scipy.sparse.linalg import splu
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.cleaning import curve_name
 from tracemesh.geometry.placement import PlacedCurve, measured_layout
 from tracemesh.geometry.polyline import measured_edges
 from tracemesh.geometry.positions import segment_vectors
 from tracemesh.geometry.samples import Layout
-from tracemesh.geometry.scan import CurveScan, Scan
+from tracemesh.geometry.scan import CurveScan, Scan, curve_name
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

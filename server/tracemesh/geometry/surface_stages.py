@@ -180,4 +180,4 @@ def _report(mesh: Mesh, complex_: CellComplex, stages: Stages) -> dict[str, obje
     warnings = ["no curve was marked as boundary: found it from the turning of the curves"] if complex_.inferred else []
     if quality.inverted_faces:
         warnings.append(f"{quality.inverted_faces} triangles are turned over: the network may need another curve there")
-    return {**asdict(quality), "patches": int(mesh.patch.max()) + 1, "stage_times": stages.times, "warnings": warnings}
+    return {**asdict(quality), "patches": int(mesh.patch.max()) + 1, "seconds": stages.times, "warnings": warnings}

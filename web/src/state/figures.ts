@@ -14,7 +14,7 @@ export function figuresOf(report: Report): Figure[] {
     figure("Noise of the frames", at(report, "network", "frame_noise_deg"), degrees),
     figure("Step", at(report, "network", "parameters", "step_m"), formatLength),
     figure("Triangles", at(report, "surface", "faces"), formatCount),
-    figure("Smallest angle", at(report, "surface", "min_angle"), degrees),
+    figure("Smallest angle", at(report, "surface", "min_angle_deg"), degrees),
     figure("Time", report.seconds, formatSeconds),
   ];
   return candidates.filter((candidate) => candidate !== undefined);
