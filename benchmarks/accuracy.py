@@ -10,11 +10,11 @@ from benchmarks.table import Cell, Column, Table
 from benchmarks.truths import CurveTruth, MeshTruth
 from tracemesh.errors import TracemeshError
 from tracemesh.formats.rawnet import read_rawnet
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
-from tracemesh.geometry.shapes import SHAPES
-from tracemesh.geometry.simulation import exact_scan
-from tracemesh.geometry.surface import span_surface
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import exact_scan
+from tracemesh.geometry.surfaces.surface import span_surface
 
 STEPS = (6.4, 3.2, 1.6, 0.8, 0.4)
 RAW_STEP = 1e-3  # of the diagonal, between the samples of a built-in shape's exact scan

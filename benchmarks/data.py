@@ -8,8 +8,8 @@ from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import recording_from_simulation, scan_from_recordings
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.scan import Scan
-from tracemesh.geometry.shapes import SHAPES, Shape
-from tracemesh.geometry.simulation import plan_scan, simulate_scan
+from tracemesh.geometry.simulated.shapes import SHAPES, Shape
+from tracemesh.geometry.simulated.simulation import plan_scan, simulate_scan
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared" / "data"

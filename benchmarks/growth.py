@@ -7,9 +7,9 @@ from benchmarks.apart import Measured, apart
 from benchmarks.data import Data, built_in
 from benchmarks.measuring import fitted_exponent
 from benchmarks.table import Cell, Column, Table
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
-from tracemesh.geometry.simulation import exact_scan
-from tracemesh.geometry.surface import SurfaceParameters, span_surface
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.simulated.simulation import exact_scan
+from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 
 SHAPE = "leaf"
 SIZES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000)

@@ -9,12 +9,12 @@ from benchmarks.data import Data, built_in, exact_network
 from benchmarks.table import Cell, Column, Table
 from benchmarks.truths import CurveTruth
 from tracemesh.formats.recordings import Recording, recording_from_simulation, scan_from_recordings
+from tracemesh.geometry.curves.reconstruction import reconstruct_network
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.reconstruction import reconstruct_network
 from tracemesh.geometry.scan import CurveScan, Scan
-from tracemesh.geometry.shape_curves import ShapeCurve
-from tracemesh.geometry.shapes import SHAPES, Shape
-from tracemesh.geometry.simulation import plan_scan, simulate_scan
+from tracemesh.geometry.simulated.shape_curves import ShapeCurve
+from tracemesh.geometry.simulated.shapes import SHAPES, Shape
+from tracemesh.geometry.simulated.simulation import plan_scan, simulate_scan
 from tracemesh.wire.device import Samples
 
 NOTE = """Mean distance of the network's points to the true curves, % of the diagonal, after rigid registration; the

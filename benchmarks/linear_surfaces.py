@@ -8,11 +8,11 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from benchmarks.measuring import Floats, Ints, vertex_areas
-from tracemesh.geometry.cell_complex import cell_complex
-from tracemesh.geometry.curvature import mean_curvature, normalised
-from tracemesh.geometry.laplacian import cotangent_laplacian
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.patches import triangulate_patches
+from tracemesh.geometry.surfaces.cell_complex import cell_complex
+from tracemesh.geometry.surfaces.curvature import mean_curvature, normalised
+from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian
+from tracemesh.geometry.surfaces.patches import triangulate_patches
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ import numpy as np
 
 from benchmarks.data import Data, KnownScan, noisy_scan
 from benchmarks.table import Cell, Column, Table
-from tracemesh.geometry.node_inference import InferredNodes, infer_nodes
+from tracemesh.geometry.nodes.node_inference import InferredNodes, infer_nodes
 from tracemesh.geometry.scan import CurveScan, Scan
-from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.simulated.shapes import SHAPES
 
 TOLERANCE = 0.02
 """m along both curves within which a proposal is the true node."""

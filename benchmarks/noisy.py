@@ -7,9 +7,9 @@ from benchmarks.data import Data, KnownScan, noisy_scan
 from benchmarks.measuring import Floats, paired_motion
 from benchmarks.table import Cell, Column, Table
 from benchmarks.truths import CurveTruth
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
-from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.simulated.shapes import SHAPES
 
 WANTED = {"sphere": 0.12, "torus": 0.15, "cone": 0.10, "bumpy": 0.12, "lilium": 0.15, "lilium7": 0.13}
 

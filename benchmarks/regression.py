@@ -8,14 +8,14 @@ from benchmarks.table import Cell, Column, Table
 from benchmarks.thesis_energy import ThesisEnergy
 from benchmarks.times import THESIS, known_scan, step_for
 from benchmarks.trust_region import TIME_LIMIT, trust_region
-from tracemesh.geometry.cleaning import clean_curves
-from tracemesh.geometry.energy import Weights
-from tracemesh.geometry.placement import place_curve, uniform_layout
-from tracemesh.geometry.regression import RegressionSolver
-from tracemesh.geometry.resampling import resample
-from tracemesh.geometry.samples import NetworkSamples
+from tracemesh.geometry.curves.cleaning import clean_curves
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.placement import place_curve, uniform_layout
+from tracemesh.geometry.curves.regression import RegressionSolver
+from tracemesh.geometry.curves.resampling import resample
+from tracemesh.geometry.curves.samples import NetworkSamples
+from tracemesh.geometry.curves.stencil import Stencil
 from tracemesh.geometry.scan import Scan
-from tracemesh.geometry.stencil import Stencil
 
 COLUMNS = (
     Column("scan"),

@@ -12,7 +12,7 @@ from benchmarks.poisson_surface import screened_poisson
 from benchmarks.table import Cell, Column, Table
 from benchmarks.truths import Field, MeshTruth, Sphere, Torus, Truth
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.surface import span_surface
+from tracemesh.geometry.surfaces.surface import span_surface
 
 LINEAR: dict[str, Method] = {"biharmonic": biharmonic, "triharmonic": triharmonic, "thesis": thesis}
 

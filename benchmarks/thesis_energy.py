@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.measuring import Floats
-from tracemesh.geometry.energy import Weights
-from tracemesh.geometry.stencil import Stencil
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.stencil import Stencil
 
 
 @dataclass(frozen=True)

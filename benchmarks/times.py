@@ -7,8 +7,8 @@ from benchmarks.apart import apart
 from benchmarks.data import Data, KnownScan, noisy_scan
 from benchmarks.measuring import warm_seconds
 from benchmarks.table import Cell, Column, Table
-from tracemesh.geometry.energy import Weights
-from tracemesh.geometry.reconstruction import NetworkParameters, NetworkReconstruction, reconstruct_network
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkReconstruction, reconstruct_network
 from tracemesh.geometry.scan import Scan
 from tracemesh.pipeline import reconstruct
 from tracemesh.wire.resources import ReconstructionParameters

@@ -11,16 +11,16 @@ from benchmarks.noisy import partners
 from benchmarks.pictures.canvas import BLUE, CURVES, GREEN, GREY, INK, ORANGE, Axes, draw_network, figure, plane, space
 from benchmarks.regression import regression_problem
 from benchmarks.truths import CurveTruth
-from tracemesh.geometry.cleaning import clean_curves, outliers
-from tracemesh.geometry.energy import Weights
+from tracemesh.geometry.curves.cleaning import clean_curves, outliers
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.curves.regression import RegressionSolver
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.node_inference import InferredNodes, infer_nodes, mark_nodes
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
-from tracemesh.geometry.regression import RegressionSolver
+from tracemesh.geometry.nodes.node_inference import InferredNodes, infer_nodes, mark_nodes
 from tracemesh.geometry.rotations import align_signs, darboux_frames, matrix_to_quaternion, normalized
 from tracemesh.geometry.scan import Scan
-from tracemesh.geometry.shapes import leaf
-from tracemesh.geometry.simulation import plan_scan, simulate_scan
+from tracemesh.geometry.simulated.shapes import leaf
+from tracemesh.geometry.simulated.simulation import plan_scan, simulate_scan
 
 STEP = 0.015
 AXES = ("t", "N", "B")

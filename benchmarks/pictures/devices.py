@@ -13,13 +13,13 @@ from benchmarks.measuring import Floats, paired_motion
 from benchmarks.noisy import partners
 from benchmarks.pictures.canvas import BLUE, GREY, ORANGE, draw_network, figure, plane, space
 from tracemesh.errors import InputError
-from tracemesh.geometry.fusion import frames_from_imu
-from tracemesh.geometry.magnetic_field import field_at
-from tracemesh.geometry.orientation import ReferenceField, frames_from_vectors
-from tracemesh.geometry.reconstruction import reconstruct_network
+from tracemesh.geometry.curves.reconstruction import reconstruct_network
 from tracemesh.geometry.scan import CurveScan, Scan
-from tracemesh.geometry.shapes import leaf
-from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.sensing.fusion import frames_from_imu
+from tracemesh.geometry.sensing.magnetic_field import field_at
+from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_vectors
+from tracemesh.geometry.simulated.shapes import leaf
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 FIELD = ReferenceField.from_inclination(np.radians(61.0))
 

@@ -25,9 +25,9 @@ from benchmarks.pictures.canvas import (
     space,
 )
 from benchmarks.truths import MeshTruth
+from tracemesh.geometry.curves.spline_network import resample_network
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.spline_network import resample_network
-from tracemesh.geometry.surface import SurfaceParameters, span_surface
+from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 
 STEP = 0.02
 UNIT = "distance to the truth, mm"

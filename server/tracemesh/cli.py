@@ -23,8 +23,8 @@ from tracemesh.terminal import ProgressLine
 from tracemesh.wire.resources import ReconstructionParameters
 
 if TYPE_CHECKING:
-    from tracemesh.geometry.node_inference import InferredNodes
-    from tracemesh.geometry.orientation import ReferenceField
+    from tracemesh.geometry.nodes.node_inference import InferredNodes
+    from tracemesh.geometry.sensing.orientation import ReferenceField
     from tracemesh.pipeline import Reconstruction
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -145,7 +145,7 @@ def _add_evaluate(commands: Commands) -> None:
 
 
 def _add_simulate(commands: Commands) -> None:
-    from tracemesh.geometry.shapes import SHAPES
+    from tracemesh.geometry.simulated.shapes import SHAPES
 
     parser = commands.add_parser(
         "simulate",
@@ -239,7 +239,7 @@ def _field(chosen: argparse.Namespace) -> ReferenceField | None:
     """The magnetic field that the person names, if any."""
     from tracemesh.formats.recordings import read_recording
     from tracemesh.formats.references import measured_reference
-    from tracemesh.geometry.magnetic_field import field_at
+    from tracemesh.geometry.sensing.magnetic_field import field_at
 
     if chosen.date and not chosen.place:
         raise InputError("--date says when the field of a --place is wanted, but there is no --place")
@@ -290,7 +290,7 @@ def _write_results(chosen: argparse.Namespace, result: Reconstruction) -> None:
 def _evaluate(chosen: argparse.Namespace) -> int:
     from tracemesh.formats.meshes import read_mesh
     from tracemesh.formats.networks import read_network
-    from tracemesh.geometry.evaluation import evaluate, vertex_normals
+    from tracemesh.geometry.comparison.evaluation import evaluate, vertex_normals
 
     truth = read_mesh(read_bytes(chosen.truth), Path(chosen.truth).suffix.lstrip("."), chosen.truth)
     if Path(chosen.input).suffix == ".json":
@@ -307,8 +307,8 @@ def _simulate(chosen: argparse.Namespace) -> int:
     from tracemesh.formats.meshes import write_triangles
     from tracemesh.formats.rawnet import write_rawnet
     from tracemesh.formats.recordings import recording_from_simulation, scan_from_recordings, write_recording
-    from tracemesh.geometry.shapes import SHAPES
-    from tracemesh.geometry.simulation import Imperfections, plan_scan, simulate_scan
+    from tracemesh.geometry.simulated.shapes import SHAPES
+    from tracemesh.geometry.simulated.simulation import Imperfections, plan_scan, simulate_scan
 
     shape = SHAPES[chosen.shape]()
     imperfections = Imperfections().scaled(chosen.noise / Imperfections.vector)

@@ -21,8 +21,8 @@ from typing import IO, Any
 from tracemesh.errors import TracemeshError
 from tracemesh.files import write_all
 from tracemesh.formats.networks import read_network
-from tracemesh.geometry.evaluation import Evaluation, evaluate
-from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.comparison.evaluation import Evaluation, evaluate
+from tracemesh.geometry.simulated.shapes import SHAPES
 from tracemesh.terminal import ProgressLine
 
 SHAPE = "leaf"

@@ -9,14 +9,14 @@ from time import perf_counter
 from tracemesh.errors import PiecesError, ScanError
 from tracemesh.formats.meshes import write_mesh
 from tracemesh.formats.networks import write_network
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
+from tracemesh.geometry.curves.sketch import give_lengths
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
-from tracemesh.geometry.odometry import NOMINAL_SPEED
-from tracemesh.geometry.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
+from tracemesh.geometry.nodes.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
 from tracemesh.geometry.scan import Scan, curve_name
-from tracemesh.geometry.sketch import give_lengths
-from tracemesh.geometry.surface import SurfaceParameters, span_surface
+from tracemesh.geometry.sensing.odometry import NOMINAL_SPEED
+from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 from tracemesh.wire.resources import ReconstructionParameters
 
 Progress = Callable[[str, float], None]

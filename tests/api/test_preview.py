@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tracemesh.formats.rawnet import read_rawnet
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.wire.live import Preview
 
 

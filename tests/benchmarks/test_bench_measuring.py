@@ -15,7 +15,7 @@ from benchmarks.measuring import (
     warm_seconds,
 )
 from benchmarks.truths import CurveTruth, Field, MeshTruth, Sphere, Torus
-from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.simulated.shapes import leaf
 
 
 def test_exponent_and_mean_of_powers() -> None:

@@ -12,11 +12,11 @@ from benchmarks.data import Data
 from benchmarks.report import read_report, record, write_report
 from benchmarks.table import Column, Table
 from benchmarks.thesis_energy import ThesisEnergy
-from tracemesh.geometry.energy import EnergyPoint
+from tracemesh.geometry.curves.energy import EnergyPoint
+from tracemesh.geometry.curves.stencil import Stencil
 from tracemesh.geometry.scan import Scan
-from tracemesh.geometry.shapes import leaf
-from tracemesh.geometry.simulation import exact_scan
-from tracemesh.geometry.stencil import Stencil
+from tracemesh.geometry.simulated.shapes import leaf
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 WITHOUT = Data(None)
 

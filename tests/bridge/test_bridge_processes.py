@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from tracemesh.geometry.shapes import cone
+from tracemesh.geometry.simulated.shapes import cone
 from tracemesh.wire.device import CurveEnd, CurveStart, ErrorMessage, NodeMark
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tracemesh.geometry.shapes import cone
+from tracemesh.geometry.simulated.shapes import cone
 from tracemesh.wire.device import NodeMark, Samples
 from tracemesh_bridge.phone import MOUNTING
 

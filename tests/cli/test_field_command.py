@@ -8,7 +8,7 @@ import pytest
 
 from tracemesh.cli import main
 from tracemesh.formats.networks import read_network
-from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.simulated.shapes import SHAPES
 
 
 def run(*arguments: object) -> int:

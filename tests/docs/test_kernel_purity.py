@@ -6,7 +6,7 @@ import sys
 PROBE = """
 import pkgutil, importlib, sys
 import tracemesh.geometry as kernel
-for module in pkgutil.iter_modules(kernel.__path__, "tracemesh.geometry."):
+for module in pkgutil.walk_packages(kernel.__path__, "tracemesh.geometry."):
     importlib.import_module(module.name)
 print(" ".join(sorted({name.split(".")[0] for name in sys.modules} & set(sys.argv[1:]))))
 """

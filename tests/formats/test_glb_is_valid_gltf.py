@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from tracemesh.formats.meshes import write_mesh
-from tracemesh.geometry.evaluation import vertex_normals
+from tracemesh.geometry.comparison.evaluation import vertex_normals
 from tracemesh.geometry.mesh import Mesh
-from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.simulated.shapes import leaf
 
 WEB = Path(__file__).resolve().parents[2] / "web"
 VALIDATE = """

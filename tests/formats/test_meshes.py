@@ -13,7 +13,7 @@ import trimesh
 from tracemesh.errors import InputError
 from tracemesh.formats.meshes import read_mesh, write_mesh, write_triangles
 from tracemesh.geometry.mesh import Mesh
-from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.simulated.shapes import leaf
 
 SHAPE = leaf()
 NETWORK = SHAPE.network(0.03)

@@ -18,8 +18,8 @@ from tracemesh.formats.recordings import (
     scan_from_recordings,
     write_recording,
 )
-from tracemesh.geometry.shapes import SHAPES, leaf
-from tracemesh.geometry.simulation import Imperfections, plan_scan, simulate_scan
+from tracemesh.geometry.simulated.shapes import SHAPES, leaf
+from tracemesh.geometry.simulated.simulation import Imperfections, plan_scan, simulate_scan
 from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Recorded, Samples, Wheel
 
 WHEEL = Wheel(circumference=0.1, ticks_per_turn=500)

@@ -4,8 +4,8 @@ from tracemesh.formats.rawnet import write_rawnet
 from tracemesh.formats.recordings import Recording, recording_from_scan, write_recording
 from tracemesh.formats.scans import is_recording, read_scan
 from tracemesh.geometry.scan import Scan
-from tracemesh.geometry.shapes import leaf
-from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.simulated.shapes import leaf
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 SCAN = exact_scan(leaf(), 0.05)
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.scan import CurveScan, Scan
-from tracemesh.geometry.shape_curves import ShapeCurve
-from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.simulated.shape_curves import ShapeCurve
+from tracemesh.geometry.simulated.shapes import SHAPES
 
 Floats = NDArray[np.float64]
 

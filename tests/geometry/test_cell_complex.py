@@ -9,9 +9,9 @@ import pytest
 
 from tests.geometry.network_fixtures import octants, radial, rings, sideways, window
 from tracemesh.errors import NetworkError
-from tracemesh.geometry.cell_complex import cell_complex
-from tracemesh.geometry.cycles import geodesic_turning, trace_cycles
 from tracemesh.geometry.network import CurveNetwork, Segment
+from tracemesh.geometry.surfaces.cell_complex import cell_complex
+from tracemesh.geometry.surfaces.cycles import geodesic_turning, trace_cycles
 
 
 def flat_window(parts: int = 4) -> CurveNetwork:

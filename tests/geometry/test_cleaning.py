@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.cleaning import clean_curve, merge_duplicates, outliers
-from tracemesh.geometry.orientation import ReferenceField, frames_from_vectors
+from tracemesh.geometry.curves.cleaning import clean_curve, merge_duplicates, outliers
 from tracemesh.geometry.rotations import align_signs, exp, matrix_to_quaternion
 from tracemesh.geometry.scan import CurveScan
-from tracemesh.geometry.shapes import SHAPES
+from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_vectors
+from tracemesh.geometry.simulated.shapes import SHAPES
 
 
 def curve_scan(samples: int = 400) -> CurveScan:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracemesh.geometry.closed_curves import from_first_node
+from tracemesh.geometry.curves.closed_curves import from_first_node
 from tracemesh.geometry.scan import CurveScan
 
 

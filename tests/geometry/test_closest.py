@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracemesh.geometry.closest import ClosestPoints, closest_on_triangles
-from tracemesh.geometry.shapes import leaf
+from tracemesh.geometry.comparison.closest import ClosestPoints, closest_on_triangles
+from tracemesh.geometry.simulated.shapes import leaf
 
 
 def slow_distance(point: np.ndarray, corners: np.ndarray) -> float:

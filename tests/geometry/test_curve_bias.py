@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracemesh.geometry.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
 from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.scan import Scan
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from tracemesh.errors import InputError
 from tracemesh.formats.meshes import read_mesh
 from tracemesh.formats.networks import read_network
-from tracemesh.geometry.evaluation import evaluate, hausdorff_distance, vertex_normals
-from tracemesh.geometry.shapes import SHAPES, leaf
+from tracemesh.geometry.comparison.evaluation import evaluate, hausdorff_distance, vertex_normals
+from tracemesh.geometry.simulated.shapes import SHAPES, leaf
 
 PLATE = np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0], [0, 4, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
 

@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.fusion import frames_from_imu
-from tracemesh.geometry.orientation import ReferenceField, frames_from_vectors
+from tracemesh.geometry.sensing.fusion import frames_from_imu
+from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_vectors
 
 Floats = NDArray[np.float64]
 INCLINATION = np.radians(61.0)

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
+from tracemesh.geometry.curves.sketch import give_lengths
 from tracemesh.geometry.scan import CurveScan, Floats, Scan
-from tracemesh.geometry.shapes import SHAPES
-from tracemesh.geometry.simulation import exact_scan
-from tracemesh.geometry.sketch import give_lengths
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 PARAMETERS = NetworkParameters(step=0.02, stretch=0.01, bend=0.02, curve_bias="off")
 

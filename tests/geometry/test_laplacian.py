@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import robust_laplacian
 
-from tracemesh.geometry.curvature import mean_curvature
-from tracemesh.geometry.edges import boundary_vertices, interior_edges, unique_edges
-from tracemesh.geometry.flattening import flatten
-from tracemesh.geometry.laplacian import cotangent_laplacian, surface_laplacian, triangle_areas
 from tracemesh.geometry.network import Floats, Ints
-from tracemesh.geometry.quality import mesh_quality
-from tracemesh.geometry.triangulation import triangulate_polygon
+from tracemesh.geometry.surfaces.curvature import mean_curvature
+from tracemesh.geometry.surfaces.edges import boundary_vertices, interior_edges, unique_edges
+from tracemesh.geometry.surfaces.flattening import flatten
+from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian, triangle_areas
+from tracemesh.geometry.surfaces.quality import mesh_quality
+from tracemesh.geometry.surfaces.triangulation import triangulate_polygon
 
 
 def icosphere(steps: int) -> tuple[Floats, Ints]:

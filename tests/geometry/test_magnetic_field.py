@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tracemesh.errors import InputError, ScanError
-from tracemesh.geometry.magnetic_field import field_at, field_at_rest
-from tracemesh.geometry.orientation import ReferenceField, frames_from_vectors
+from tracemesh.geometry.sensing.magnetic_field import field_at, field_at_rest
+from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_vectors
 
 
 def inclination(field: ReferenceField) -> float:

@@ -11,15 +11,15 @@ from scipy.spatial.transform import Rotation
 from tracemesh.errors import ScanError
 from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import recording_from_simulation, scan_from_recordings
-from tracemesh.geometry.attachment import _statistics, attach, table_of
-from tracemesh.geometry.contacts import Contact, _System, settle
-from tracemesh.geometry.crossings import find_crossings
-from tracemesh.geometry.floating import FloatingCurve, Pose, float_curves
-from tracemesh.geometry.node_inference import InferredNodes, infer_nodes, mark_nodes
-from tracemesh.geometry.reconstruction import reconstruct_network
+from tracemesh.geometry.curves.reconstruction import reconstruct_network
+from tracemesh.geometry.nodes.attachment import _statistics, attach, table_of
+from tracemesh.geometry.nodes.contacts import Contact, _System, settle
+from tracemesh.geometry.nodes.crossings import find_crossings
+from tracemesh.geometry.nodes.floating import FloatingCurve, Pose, float_curves
+from tracemesh.geometry.nodes.node_inference import InferredNodes, infer_nodes, mark_nodes
 from tracemesh.geometry.scan import CurveScan, Scan
-from tracemesh.geometry.shapes import SHAPES, leaf
-from tracemesh.geometry.simulation import exact_scan, plan_scan, simulate_scan
+from tracemesh.geometry.simulated.shapes import SHAPES, leaf
+from tracemesh.geometry.simulated.simulation import exact_scan, plan_scan, simulate_scan
 
 SCANS = ("sphere", "torus", "cone", "bumpy", "lilium", "lilium7")
 NOTHING = np.empty(0, np.int64)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.odometry import NOMINAL_SPEED, distance_from_ticks, distance_from_time
+from tracemesh.geometry.sensing.odometry import NOMINAL_SPEED, distance_from_ticks, distance_from_time
 
 
 @settings(max_examples=50, deadline=None)

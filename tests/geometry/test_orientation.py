@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.orientation import (
+from tracemesh.geometry.rotations import exp
+from tracemesh.geometry.sensing.orientation import (
     ReferenceField,
     frames_from_quaternions,
     frames_from_vectors,
@@ -12,7 +13,6 @@ from tracemesh.geometry.orientation import (
     vector_quality,
     wahba,
 )
-from tracemesh.geometry.rotations import exp
 
 FIELD = ReferenceField()
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.cleaning import clean_curves
-from tracemesh.geometry.placement import place_curve, uniform_layout
-from tracemesh.geometry.positions import check_connected, segment_vectors, solve_positions
-from tracemesh.geometry.quadrature import edge_vectors
+from tracemesh.geometry.curves.cleaning import clean_curves
+from tracemesh.geometry.curves.placement import place_curve, uniform_layout
+from tracemesh.geometry.curves.positions import check_connected, segment_vectors, solve_positions
+from tracemesh.geometry.curves.quadrature import edge_vectors
+from tracemesh.geometry.curves.samples import Layout, NetworkSamples
 from tracemesh.geometry.rotations import exp
-from tracemesh.geometry.samples import Layout, NetworkSamples
 from tracemesh.geometry.scan import Scan
-from tracemesh.geometry.shapes import SHAPES
-from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 
 def layout_of(name: str, step: float) -> Layout:

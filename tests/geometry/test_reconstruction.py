@@ -16,14 +16,14 @@ from scipy.spatial import cKDTree
 from tracemesh.errors import Cancelled, ScanError
 from tracemesh.formats.meshes import read_mesh
 from tracemesh.formats.rawnet import read_rawnet
-from tracemesh.geometry.energy import Weights
-from tracemesh.geometry.evaluation import evaluate
+from tracemesh.geometry.comparison.evaluation import evaluate
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkReconstruction, reconstruct_network
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.reconstruction import NetworkParameters, NetworkReconstruction, reconstruct_network
 from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.scan import CurveScan, Scan
-from tracemesh.geometry.shapes import SHAPES
-from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 FIXED = NetworkParameters(step=0.012, stretch=0.0, bend=0.02, curve_bias="off")
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.geometry.network_fixtures import octants, window
-from tracemesh.geometry.curvature import normalised
-from tracemesh.geometry.curvature_variation import Shape, variation_rows
-from tracemesh.geometry.edges import boundary_vertices, interior_edges
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import Floats
-from tracemesh.geometry.refinement import _system, refine
-from tracemesh.geometry.surface import SurfaceParameters, span_surface
+from tracemesh.geometry.surfaces.curvature import normalised
+from tracemesh.geometry.surfaces.curvature_variation import Shape, variation_rows
+from tracemesh.geometry.surfaces.edges import boundary_vertices, interior_edges
+from tracemesh.geometry.surfaces.refinement import _system, refine
+from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 
 
 def linear(parts: int = 8) -> tuple[Mesh, int]:

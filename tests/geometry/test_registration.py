@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tracemesh.geometry.closest import ClosestPoints
-from tracemesh.geometry.registration import register
-from tracemesh.geometry.shapes import SHAPES, leaf
+from tracemesh.geometry.comparison.closest import ClosestPoints
+from tracemesh.geometry.comparison.registration import register
+from tracemesh.geometry.simulated.shapes import SHAPES, leaf
 
 VERTICES, FACES = leaf().mesh(32)
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tracemesh.geometry.cleaning import clean_curves
-from tracemesh.geometry.energy import EnergyPoint, Weights, pattern_of
-from tracemesh.geometry.placement import place_curve, uniform_layout
-from tracemesh.geometry.regression import RegressionSolver
-from tracemesh.geometry.resampling import resample
+from tracemesh.geometry.curves.cleaning import clean_curves
+from tracemesh.geometry.curves.energy import EnergyPoint, Weights, pattern_of
+from tracemesh.geometry.curves.placement import place_curve, uniform_layout
+from tracemesh.geometry.curves.regression import RegressionSolver
+from tracemesh.geometry.curves.resampling import resample
+from tracemesh.geometry.curves.samples import NetworkSamples
+from tracemesh.geometry.curves.stencil import Stencil
 from tracemesh.geometry.rotations import exp, log
-from tracemesh.geometry.samples import NetworkSamples
-from tracemesh.geometry.shapes import SHAPES
-from tracemesh.geometry.simulation import exact_scan
-from tracemesh.geometry.stencil import Stencil
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 WEIGHTS = Weights(stretch=0.05, bend=0.08)
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.cleaning import clean_curve, clean_curves
-from tracemesh.geometry.placement import measured_layout, place_curve, uniform_layout
-from tracemesh.geometry.resampling import fit_matrix, resample
+from tracemesh.geometry.curves.cleaning import clean_curve, clean_curves
+from tracemesh.geometry.curves.placement import measured_layout, place_curve, uniform_layout
+from tracemesh.geometry.curves.resampling import fit_matrix, resample
 from tracemesh.geometry.rotations import exp, log
 from tracemesh.geometry.scan import CurveScan
-from tracemesh.geometry.shapes import SHAPES
-from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 
 def scan_of(arc: np.ndarray, marks: list[int], ids: list[int], closed: bool = False) -> CurveScan:

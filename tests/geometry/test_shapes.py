@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from tracemesh.geometry.cycles import trace_cycles
-from tracemesh.geometry.shapes import SHAPES, Shape
+from tracemesh.geometry.simulated.shapes import SHAPES, Shape
+from tracemesh.geometry.surfaces.cycles import trace_cycles
 
 
 @pytest.fixture(params=sorted(SHAPES))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracemesh.geometry.shapes import SHAPES, leaf
-from tracemesh.geometry.simulation import (
+from tracemesh.geometry.simulated.shapes import SHAPES, leaf
+from tracemesh.geometry.simulated.simulation import (
     COUNTS,
     FULL_SCALE,
     REFERENCE_ACCELERATION,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tracemesh.geometry.reconstruction import reconstruct_network
+from tracemesh.geometry.curves.reconstruction import reconstruct_network
 from tracemesh.geometry.scan import CurveScan, Scan
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tracemesh.errors import NetworkError
+from tracemesh.geometry.curves.spline_network import resample_network
 from tracemesh.geometry.network import CurveNetwork, Segment
-from tracemesh.geometry.shapes import SHAPES
-from tracemesh.geometry.spline_network import resample_network
+from tracemesh.geometry.simulated.shapes import SHAPES
 
 
 def uneven(name: str, step: float, seed: int = 0) -> CurveNetwork:

@@ -15,12 +15,12 @@ from scipy.spatial.transform import Rotation
 from tests.geometry.network_fixtures import octants, radial, rings, sideways, upwards, window
 from tracemesh.errors import Cancelled, SurfaceError, TracemeshError
 from tracemesh.formats.networks import read_network
-from tracemesh.geometry.edges import unique_edges
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
-from tracemesh.geometry.quality import mesh_quality
-from tracemesh.geometry.subdivision import subdivided
-from tracemesh.geometry.surface import SurfaceParameters, span_surface
+from tracemesh.geometry.surfaces.edges import unique_edges
+from tracemesh.geometry.surfaces.quality import mesh_quality
+from tracemesh.geometry.surfaces.subdivision import subdivided
+from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 
 EULER = {
     "sphere-3": 2, "sphere-9": 2, "torus-3": 0, "torus-9": 0, "field-2": 1,

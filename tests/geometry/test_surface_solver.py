@@ -9,11 +9,11 @@ import pytest
 
 from tests.geometry.network_fixtures import rings, sideways, window
 from tracemesh.formats.networks import read_network
-from tracemesh.geometry.closest import ClosestPoints
+from tracemesh.geometry.comparison.closest import ClosestPoints
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
-from tracemesh.geometry.surface import SurfaceParameters, span_surface
-from tracemesh.geometry.surface_solver import SurfaceSolver
+from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
+from tracemesh.geometry.surfaces.surface_solver import SurfaceSolver
 
 DIAGONAL = np.sqrt(304)
 

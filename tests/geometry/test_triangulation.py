@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from tracemesh.errors import SurfaceError
 from tracemesh.geometry.network import Floats, Ints
-from tracemesh.geometry.planar_maps import develop, map_to_circle, project_to_plane, signed_area
-from tracemesh.geometry.quality import triangle_angles
-from tracemesh.geometry.triangulation import triangulate_polygon
+from tracemesh.geometry.surfaces.planar_maps import develop, map_to_circle, project_to_plane, signed_area
+from tracemesh.geometry.surfaces.quality import triangle_angles
+from tracemesh.geometry.surfaces.triangulation import triangulate_polygon
 
 
 def circle(count: int) -> Floats:

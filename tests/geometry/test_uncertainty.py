@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tracemesh.geometry.reconstruction import NetworkResult, reconstruct_network
+from tracemesh.geometry.curves.reconstruction import NetworkResult, reconstruct_network
 
 FAULTS = (
     {"noise": 0.02},

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tracemesh.geometry.cleaning import clean_curves
-from tracemesh.geometry.energy import Weights
-from tracemesh.geometry.placement import PlacedCurve, place_curve, uniform_layout
-from tracemesh.geometry.regression import RegressionSolver
-from tracemesh.geometry.resampling import resample
+from tracemesh.geometry.curves.cleaning import clean_curves
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.placement import PlacedCurve, place_curve, uniform_layout
+from tracemesh.geometry.curves.regression import RegressionSolver
+from tracemesh.geometry.curves.resampling import resample
+from tracemesh.geometry.curves.samples import NetworkSamples
+from tracemesh.geometry.curves.weights import choose_weights, noise_level
 from tracemesh.geometry.rotations import log
-from tracemesh.geometry.samples import NetworkSamples
-from tracemesh.geometry.weights import choose_weights, noise_level
 
 STEP = 0.015
 

@@ -10,8 +10,8 @@ from websockets.sync.client import connect
 
 from tests.web.support import PATIENCE, Rider, Server, free_port, running_server
 from tracemesh.formats.recordings import recording_from_simulation
-from tracemesh.geometry.shapes import leaf
-from tracemesh.geometry.simulation import plan_scan, simulate_scan
+from tracemesh.geometry.simulated.shapes import leaf
+from tracemesh.geometry.simulated.simulation import plan_scan, simulate_scan
 
 CHROMIUM = "/usr/bin/chromium"
 FLAGS = (

@@ -9,8 +9,8 @@ from playwright.sync_api import Locator, Page, expect
 from tests.web.support import Rider, Server, share_of_pixels
 from tracemesh.formats.meshes import read_mesh
 from tracemesh.formats.rawnet import write_rawnet
-from tracemesh.geometry.shapes import leaf
-from tracemesh.geometry.simulation import exact_scan
+from tracemesh.geometry.simulated.shapes import leaf
+from tracemesh.geometry.simulated.simulation import exact_scan
 
 
 def test_a_ride_is_watched_and_becomes_a_surface(

@@ -6,16 +6,12 @@ Apart from the devices because the simulation brings half of scipy with it, whic
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
-from tracemesh.geometry import shapes
-from tracemesh.geometry.simulation import Handling, Imperfections, ScanPlan, plan_scan
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import Handling, Imperfections, ScanPlan, plan_scan
 from tracemesh_bridge.errors import BridgeError
 from tracemesh_bridge.sources.virtual import say
-
-SHAPES: dict[str, Callable[[], shapes.Shape]] = {
-    f.__name__: f for f in (shapes.leaf, shapes.sphere, shapes.torus, shapes.cone, shapes.egg)
-}
 
 
 def ride_plan(shape: str, noise: float, seed: int) -> ScanPlan:

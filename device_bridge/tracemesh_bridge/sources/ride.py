@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from tracemesh.geometry.simulation import COUNTS
+from tracemesh.geometry.simulated.simulation import COUNTS
 from tracemesh_bridge.framing import Frame, FrameLayout, encode
 from tracemesh_bridge.sources.operator import Operator, ride_plan
 from tracemesh_bridge.sources.virtual import LATE_BY, VirtualSettings

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
-from tracemesh.geometry.simulation import ScanPlan
+from tracemesh.geometry.simulated.simulation import ScanPlan
 from tracemesh_bridge.phone import MOUNTING
 from tracemesh_bridge.pose import GRAVITY
 from tracemesh_bridge.sources.operator import Operator, ride_plan

@@ -8,13 +8,13 @@ import numpy as np
 from pydantic import ValidationError
 
 from tracemesh.errors import InputError, ScanError
-from tracemesh.geometry.closed_curves import from_first_node
-from tracemesh.geometry.fusion import frames_from_imu
-from tracemesh.geometry.odometry import distance_from_ticks, distance_from_time
-from tracemesh.geometry.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
+from tracemesh.geometry.curves.closed_curves import from_first_node
 from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
-from tracemesh.geometry.simulation import (
+from tracemesh.geometry.sensing.fusion import frames_from_imu
+from tracemesh.geometry.sensing.odometry import distance_from_ticks, distance_from_time
+from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
+from tracemesh.geometry.simulated.simulation import (
     COUNTS,
     FULL_SCALE,
     REFERENCE_ACCELERATION,

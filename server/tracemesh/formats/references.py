@@ -6,8 +6,8 @@ import numpy as np
 
 from tracemesh.errors import InputError
 from tracemesh.formats.recordings import Recording
-from tracemesh.geometry.magnetic_field import field_at_rest
-from tracemesh.geometry.orientation import ReferenceField
+from tracemesh.geometry.sensing.magnetic_field import field_at_rest
+from tracemesh.geometry.sensing.orientation import ReferenceField
 from tracemesh.wire.device import Reference, Samples
 
 

@@ -4,8 +4,8 @@ from tracemesh.errors import InputError
 from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import read_recording, scan_from_recordings
 from tracemesh.formats.references import with_reference
-from tracemesh.geometry.orientation import ReferenceField
 from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.sensing.orientation import ReferenceField
 
 
 def read_scan(text: str, source: str = "", field: ReferenceField | None = None) -> Scan:

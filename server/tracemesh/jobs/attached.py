@@ -67,7 +67,7 @@ def solve_network(
     scan: Scan, indices: Sequence[int], parameters: ReconstructionParameters | None = None
 ) -> SolvedNetwork:
     """The network of a scan whose curves have these indices in the session; raises ScanError."""
-    from tracemesh.geometry.reconstruction import reconstruct_network
+    from tracemesh.geometry.curves.reconstruction import reconstruct_network
     from tracemesh.pipeline import network_parameters
 
     result = reconstruct_network(scan, network_parameters(parameters or ReconstructionParameters()))

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from tracemesh.geometry.closed_curves import sample_as_scanned
+from tracemesh.geometry.curves.closed_curves import sample_as_scanned
 from tracemesh.geometry.scan import CurveScan, Scan
 from tracemesh.wire.resources import Curve, NodePlace, NodeProposal, NodeProposals
 
 
 def propose_nodes(scan: Scan, curves: Sequence[Curve]) -> NodeProposals:
     """Nodes of a scan whose curves are these ones of a session; raises ScanError."""
-    from tracemesh.geometry.node_inference import infer_nodes  # here, so that the server itself stays small
+    from tracemesh.geometry.nodes.node_inference import infer_nodes  # here, so that the server itself stays small
 
     found = infer_nodes(scan)
     proposals = [

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.odometry import COUNTER_RANGE, NOMINAL_SPEED
-from tracemesh.geometry.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
 from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import Floats
+from tracemesh.geometry.sensing.odometry import COUNTER_RANGE, NOMINAL_SPEED
+from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
 from tracemesh.wire.device import Device, Samples
 
 SPACING = 0.003

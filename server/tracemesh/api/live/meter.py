@@ -5,8 +5,8 @@ from time import monotonic
 
 import numpy as np
 
-from tracemesh.geometry.orientation import angles_between
 from tracemesh.geometry.scan import Floats
+from tracemesh.geometry.sensing.orientation import angles_between
 from tracemesh.wire.device import Hello, Samples
 from tracemesh.wire.live import LiveDevice
 

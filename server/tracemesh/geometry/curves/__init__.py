@@ -1,0 +1,1 @@
+"""From a scan to a curve network (thesis chapter 3)."""

@@ -1,0 +1,199 @@
+"""What keeps a network from closing, as linear equations in the errors that each curve has as a whole.
+
+Per segment with vector V from mark i to mark j, and per mark with normal N, to first order:
+
+    P_b - P_a - V     = b x V + s V + u_j t_j - u_i t_i + noise      (three equations)
+    N_node - N        = b x N + u N'                    + noise      (two, in the tangent plane)
+
+b: rotation of the curve's frames (a disturbed heading, a crooked mounting), rad; s: relative error of its lengths; u:
+how far the node lies beyond the place where it was marked, m. Node positions P and normals N_node are free.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array
+from scipy.sparse.csgraph import breadth_first_order
+from scipy.sparse.linalg import splu
+
+from tracemesh.geometry.curves.positions import segment_vectors, solve_positions
+from tracemesh.geometry.curves.quadrature import edge_vectors
+from tracemesh.geometry.curves.samples import Layout
+from tracemesh.geometry.rotations import hat, normalized
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+_END_DEVIATION = 2.0  # of a spline at its end, over that inside: its kernel is one-sided there
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """Expected errors that no curve has as a whole. walk: (c,) m, variance per metre travelled of a curve's positions,
+    per axis. normal: (c,) rad, standard deviation of a smoothed normal inside a curve, per axis. drift: relative to a
+    segment's length, what no device does better.
+    """
+
+    walk: Floats
+    normal: Floats
+    drift: float
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Equations y + A p = G theta + noise, each divided by the expected standard deviation of its noise.
+
+    y: (r,). free: (r, f) sparse, for the free unknowns p. shared: (r, p) sparse, for theta: rotations (c, 3), scales
+    (c,), shifts (m,), one after the other.
+    """
+
+    y: Floats
+    free: csc_array
+    shared: csc_array
+
+    def part(self, rows: Ints, columns: Ints) -> "Equations":
+        """Only some equations and only some of theta."""
+        free = self.free.tocsr()[rows].tocsc()
+        used = np.flatnonzero(np.diff(free.indptr))
+        return Equations(self.y[rows], free[:, used], self.shared.tocsr()[rows].tocsc()[:, columns])
+
+    def eliminated(self) -> "Summary":
+        """Sums over the equations that remain when the free unknowns are fitted."""
+        g, a = self.shared, self.free
+        square, linear = (g.T @ g).toarray(), g.T @ self.y
+        total, rank = float(self.y @ self.y), a.shape[1]
+        if rank:
+            right = np.column_stack([(a.T @ g).toarray(), a.T @ self.y])
+            fitted = splu((a.T @ a).tocsc()).solve(right)
+            square -= right[:, :-1].T @ fitted[:, :-1]
+            linear = linear - right[:, :-1].T @ fitted[:, -1]
+            total -= float(right[:, -1] @ fitted[:, -1])
+        return Summary(square, linear, max(total, 0.0), len(self.y) - rank)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Sum of squares as a function of theta: total - 2 linear . theta + theta^T square theta, over count equations."""
+
+    square: Floats
+    linear: Floats
+    total: float
+    count: int
+
+
+def tangent_bases(normals: Floats) -> Floats:
+    """Two unit vectors (k, 2, 3) orthogonal to each unit normal (k, 3) and to each other."""
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = normalized(np.cross(normals, least))
+    return np.stack([first, np.cross(normals, first)], axis=1)
+
+
+def _sparse(rows: list[Ints], columns: list[Ints], values: list[Floats], shape: tuple[int, int]) -> csc_array:
+    entries = np.concatenate([v.ravel() for v in values])
+    index = tuple(
+        np.concatenate([np.broadcast_to(i, v.shape).ravel() for i, v in zip(part, values, strict=True)])
+        for part in (rows, columns)
+    )
+    return coo_array((entries, index), shape=shape).tocsc()
+
+
+class Misclosures:
+    """The equations of one network, from frames whose curves do not know of each other."""
+
+    def __init__(self, layout: Layout, frames: Floats, noise: NoiseLevel) -> None:
+        """frames: (n, 3, 3) at the layout's rows."""
+        self.layout, self._frames = layout, frames
+        self.curves, self.marks = len(layout.closed), len(layout.marks)
+        self.size = 4 * self.curves + self.marks
+        self.segments = self._segment_equations(noise)
+        self.normals = self._normal_equations(noise)
+
+    def _columns(self, curve: Ints) -> tuple[Ints, Ints]:
+        """Columns (k, 3) of the rotations and (k,) of the scales of curves (k,)."""
+        return 3 * curve[:, None] + np.arange(3), 3 * self.curves + curve
+
+    def _segment_equations(self, noise: NoiseLevel) -> Equations:
+        layout = self.layout
+        edges = edge_vectors(layout, self._frames)
+        vectors, gaps = segment_vectors(layout, edges), solve_positions(layout, edges).gaps
+        curve, start = layout.segment_curve, layout.segments
+        length = layout.segment_lengths
+        weight = 1 / np.sqrt(noise.walk[curve] * length + (noise.drift * length) ** 2)
+        tangent = self._frames[layout.marks, :, 0]
+        row = 3 * np.arange(len(start))[:, None] + np.arange(3)
+        rotation, scale = self._columns(curve)
+        shift = 4 * self.curves + start
+        w = weight[:, None]
+        shared = _sparse(
+            [row[:, :, None], row, row, row],
+            [rotation[:, None, :], scale[:, None], shift[:, None], shift[:, None] + 1],
+            [-w[:, :, None] * hat(vectors), w * vectors, -w * tangent[start], w * tangent[start + 1]],
+            (row.size, self.size),
+        )
+        a, b = layout.segment_nodes.T
+        free = _sparse(
+            [row, row],
+            [3 * a[:, None] + np.arange(3), 3 * b[:, None] + np.arange(3)],
+            [np.repeat(-w, 3, axis=1), np.repeat(w, 3, axis=1)],
+            (row.size, 3 * layout.node_count),
+        )
+        return Equations((w * gaps).ravel(), -free[:, 3:], shared)  # node 0 stays where it is
+
+    def _normal_equations(self, noise: NoiseLevel) -> Equations:
+        layout, marks, node = self.layout, self.layout.marks, self.layout.nodes
+        normal, curve = self._frames[marks, :, 1], layout.curve[marks]
+        mean = np.zeros((layout.node_count, 3))
+        np.add.at(mean, node, normal)
+        mean = normalized(mean)
+        at_end = np.isin(marks, layout.first[:-1]) | np.isin(marks, layout.first[1:] - 1)
+        level = 1 / (noise.normal[curve] * np.where(at_end, _END_DEVIATION, 1.0))
+        basis = level[:, None, None] * tangent_bases(mean)[node]
+        row = 2 * np.arange(len(marks))[:, None] + np.arange(2)
+        rotation, _ = self._columns(curve)
+        shift = 4 * self.curves + np.arange(len(marks))
+        bend = np.einsum("mij,mj->mi", basis, self._normal_rates()[marks])
+        shared = _sparse(
+            [row[:, :, None], row],
+            [rotation[:, None, :], shift[:, None]],
+            [-basis @ hat(normal), bend],
+            (row.size, self.size),
+        )
+        both = np.repeat(level[:, None], 2, axis=1)
+        free = _sparse([row], [2 * node[:, None] + np.arange(2)], [both], (row.size, 2 * len(mean)))
+        return Equations(np.einsum("mij,mj->mi", basis, mean[node] - normal).ravel(), -free, shared)
+
+    def _normal_rates(self) -> Floats:
+        """Change of the normal per metre (n, 3) at every row."""
+        layout, normal = self.layout, self._frames[:, :, 1]
+        rates = np.empty_like(normal)
+        for first, last in zip(layout.first[:-1], layout.first[1:], strict=True):
+            rates[first:last] = np.gradient(normal[first:last], layout.arc[first:last], axis=0)
+        return rates
+
+    def sample(self, most_marks: int) -> tuple[tuple[Equations, Equations], Ints, Ints]:
+        """Equations between at most about `most_marks` marks that lie together, and the curves and marks in them."""
+        layout = self.layout
+        chosen = _neighbourhood(layout, most_marks)
+        inside = chosen[layout.segment_nodes].all(axis=1)
+        marks = np.flatnonzero(chosen[layout.nodes])
+        curves = np.unique(layout.curve[layout.marks[marks]])
+        columns = np.concatenate(
+            [(3 * curves[:, None] + np.arange(3)).ravel(), 3 * self.curves + curves, 4 * self.curves + marks]
+        )
+        three, two = np.repeat(inside, 3), np.repeat(chosen[layout.nodes], 2)
+        parts = self.segments.part(np.flatnonzero(three), columns), self.normals.part(np.flatnonzero(two), columns)
+        return parts, curves, marks
+
+
+def _neighbourhood(layout: Layout, most_marks: int) -> Bools:
+    """Nodes (k,) nearest, in segments, to the node with most marks, until they have `most_marks` marks."""
+    uses = np.bincount(layout.nodes, minlength=layout.node_count)
+    a, b = layout.segment_nodes.T
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(layout.node_count,) * 2).tocsr()
+    order = breadth_first_order(graph, int(uses.argmax()), directed=False, return_predecessors=False)
+    chosen = np.zeros(layout.node_count, bool)
+    chosen[order[: max(2, int(np.searchsorted(np.cumsum(uses[order]), most_marks)) + 1)]] = True
+    return chosen

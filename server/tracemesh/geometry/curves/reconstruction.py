@@ -1,0 +1,248 @@
+"""From a scan to a curve network: every step of thesis chapter 3 in order."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracemesh.errors import ScanError
+from tracemesh.geometry.curves.assembly import assemble_network, per_point
+from tracemesh.geometry.curves.cleaning import CleanCurve, clean_curves
+from tracemesh.geometry.curves.closing import Closed, close_network
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.network_report import bias_report, fit_warnings
+from tracemesh.geometry.curves.placement import PlacedCurve, measured_layout, place_curve, uniform_layout
+from tracemesh.geometry.curves.polyline import MeasuredNetwork, measure_network, points_on_polyline
+from tracemesh.geometry.curves.positions import Positions, check_connected, solve_positions
+from tracemesh.geometry.curves.quadrature import edge_vectors
+from tracemesh.geometry.curves.regression import Regression, RegressionSolver
+from tracemesh.geometry.curves.resampling import resample
+from tracemesh.geometry.curves.samples import Layout, NetworkSamples
+from tracemesh.geometry.curves.sketch import with_lengths
+from tracemesh.geometry.curves.uncertainty import point_uncertainty
+from tracemesh.geometry.curves.weights import choose_weights
+from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.scan import Scan, curve_name
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Progress = Callable[[str, float], None]
+
+_STAGES = ("cleaning", "measuring", "resampling", "weighing", "closing", "smoothing", "positions", "uncertainty")
+_FLATTEST = 1e-3  # diagonal over length of the curves that a step is still derived from
+_MOST_SAMPLES = 5_000_000
+_OPEN_GAP = 0.2  # of its length that a closed curve may lack as measured; a half circle lacks 0.64
+
+
+@dataclass(frozen=True)
+class NetworkParameters:
+    """step: m between samples; None: step_fraction of the diagonal estimated from the scan. stretch, bend: smoothing
+    lengths, m; None: automatic, or 0 if only the other is given. weights: automatic ones by cross-validation, or the
+    thesis's lambda = mu = 1 in metres. curve_bias: estimate a rotation and a scale per curve and how far its nodes are
+    from their marks: where the data speak for it, always, or never.
+    """
+
+    step: float | None = None
+    step_fraction: float = 0.016
+    stretch: float | None = None
+    bend: float | None = None
+    weights: Literal["auto", "thesis"] = "auto"
+    curve_bias: Literal["auto", "on", "off"] = "auto"
+
+
+@dataclass(frozen=True)
+class NetworkResult:
+    """network: the reconstruction. frames: (n, 3, 3) [t N B] at its points, a node's being of its first curve.
+    uncertainty: (n,) m, root mean square distance of each point from the truth. report: what was done, JSON-able.
+    """
+
+    network: CurveNetwork
+    frames: Floats
+    uncertainty: Floats
+    report: dict[str, object]
+
+
+class _Stages:
+    """Says how far the work is and how long each stage took."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._current: str | None = None
+        self._start = 0.0
+        self.seconds: dict[str, float] = {}
+
+    def begin(self, name: str) -> None:
+        """Close the running stage and announce the next; may raise Cancelled."""
+        self.end()
+        if self._progress is not None:
+            self._progress(name, _STAGES.index(name) / len(_STAGES))
+        self._current, self._start = name, time.perf_counter()
+
+    def end(self) -> None:
+        """Close the running stage."""
+        if self._current is not None:
+            self.seconds[self._current] = time.perf_counter() - self._start
+            self._current = None
+
+
+class NetworkReconstruction:
+    """A scan made ready, so that other smoothing lengths cost only what depends on them."""
+
+    def __init__(
+        self, scan: Scan, parameters: NetworkParameters | None = None, progress: Progress | None = None
+    ) -> None:
+        """Do all that comes before the regression; raises ScanError naming the curve that prevents it."""
+        self._parameters = NetworkParameters() if parameters is None else parameters
+        _check_parameters(self._parameters)
+        self._stages = _Stages(progress)
+        self._stages.begin("cleaning")
+        self._cleaned = _cleaned(scan)
+        curves = tuple(place_curve(curve) for curve in self._cleaned)
+        self._indices = np.array([c.index for c in curves])
+        self._stages.begin("measuring")
+        check_connected(measured_layout(curves), self._indices)
+        curves = with_lengths(curves)
+        self._measured = measure_network(curves, measured_layout(curves))
+        _check_closed(curves, self._measured)
+        self._step = _step(self._parameters, curves, self._measured)
+        self._stages.begin("resampling")
+        samples = resample(curves, uniform_layout(curves, self._step), self._step)
+        self._stages.begin("weighing")
+        self._choice = choose_weights(curves, samples, self._step)
+        self._stages.begin("closing")
+        self._closed = self._close(curves, samples)
+        self._samples = self._closed.samples if self._closed else samples
+        self._start = self._closed.start if self._closed else self._choice.frames
+        self._solver = RegressionSolver(self._samples.layout)
+        self._stages.end()
+
+    def _close(self, curves: Sequence[PlacedCurve], samples: NetworkSamples) -> Closed | None:
+        """The network freed from errors of whole curves; None for a polyline, which is exact as it is."""
+        if self._measured.is_polyline:
+            return None
+        return close_network(curves, samples, self._choice, self._step, self._parameters.curve_bias)
+
+    def solve(self, weights: Weights | None = None) -> NetworkResult:
+        """The network, smoothed with the chosen weights or with others; the latter starts from the solution before."""
+        layout = self._samples.layout
+        used = weights or _weights(self._parameters, self._choice.weights)
+        self._stages.begin("smoothing")
+        regression = self._solver.solve(self._samples.frames, used, self._start)
+        self._stages.begin("positions")
+        positions = self._positions(layout, regression.frames)
+        self._stages.begin("uncertainty")
+        uncertainty = self._uncertainty(layout, positions, regression.frames)
+        network = assemble_network(layout, positions.points, regression.frames, self._indices)
+        self._stages.end()
+        report = self._report(network, regression, positions, used, uncertainty)
+        return NetworkResult(network, per_point(layout, regression.frames), per_point(layout, uncertainty), report)
+
+    def _uncertainty(self, layout: Layout, positions: Positions, frames: Floats) -> Floats:
+        if self._closed is None:
+            return np.full(layout.size, self._measured.chord_residual)
+        closing, tangent = self._closed.closing, frames[:, :, 0]
+        expected = point_uncertainty(closing.adjustment, layout, positions.points, tangent, closing.walk)
+        return expected * closing.noise_factor(layout, positions.gaps)
+
+    def _positions(self, layout: Layout, frames: Floats) -> Positions:
+        if self._measured.is_polyline:
+            return Positions(points_on_polyline(self._measured, layout), self._measured.positions.gaps)
+        return solve_positions(layout, edge_vectors(layout, frames))
+
+    def _warnings(self, layout: Layout, positions: Positions) -> list[str]:
+        if self._closed is None:
+            return []
+        return fit_warnings(layout, positions.gaps, self._closed.closing.expected_gaps(layout), self._indices)
+
+    def _report(
+        self,
+        network: CurveNetwork,
+        regression: Regression,
+        positions: Positions,
+        weights: Weights,
+        uncertainty: Floats,
+    ) -> dict[str, object]:
+        layout, measured = self._samples.layout, self._measured
+        gaps = np.linalg.norm(positions.gaps, axis=1)
+        return {
+            "parameters": {
+                "step_m": self._step,
+                "stretch_m": weights.stretch,
+                "bend_m": weights.bend,
+                "curve_bias": "on" if self._closed and self._closed.found.variances.with_bias else "off",
+                "tangents": "chords to the next sample" if measured.is_polyline else "tangents of the curve",
+            },
+            "sizes": {
+                "curves": len(self._cleaned),
+                "samples": sum(c.samples for c in self._cleaned),
+                "outliers": sum(c.dropped for c in self._cleaned),
+                "points": len(network.points),
+                "nodes": len(network.nodes),
+                "segments": len(network.segments),
+                "length_m": float(layout.lengths.sum()),
+                "diagonal_m": network.diagonal,
+            },
+            "frame_noise_deg": float(np.rad2deg(self._choice.noise)),
+            "curve_bias": bias_report(self._closed.found if self._closed else None, self._indices),
+            "closure": {"rms_m": float(np.sqrt(np.mean(gaps**2))), "max_m": float(gaps.max())},
+            "uncertainty": {"mean_m": float(uncertainty.mean()), "max_m": float(uncertainty.max())},
+            "regression": {"energy": regression.energy, "iterations": regression.iterations},
+            "seconds": dict(self._stages.seconds),
+            "warnings": self._warnings(layout, positions),
+        }
+
+
+def _cleaned(scan: Scan) -> tuple[CleanCurve, ...]:
+    if not scan.curves:
+        raise ScanError("the scan holds no curve")
+    return clean_curves(scan.curves)
+
+
+def _check_parameters(parameters: NetworkParameters) -> None:
+    for name in ("step", "step_fraction", "stretch", "bend"):
+        value = getattr(parameters, name)
+        least_is_zero = name in ("stretch", "bend")
+        if value is not None and not (np.isfinite(value) and (value > 0 or (value == 0 and least_is_zero))):
+            raise ScanError(
+                f"{name} must be a {'number of at least 0' if least_is_zero else 'positive number'}, got {value}"
+            )
+
+
+def _step(parameters: NetworkParameters, curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> float:
+    length = sum(curve.length for curve in curves)
+    step = parameters.step_fraction * max(measured.diagonal, _FLATTEST * length)
+    step = step if parameters.step is None else parameters.step
+    if length / step > _MOST_SAMPLES:
+        raise ScanError(
+            f"a step of {step:.3g} m would cut the curves, {length:.3g} m long, into more than {_MOST_SAMPLES} samples"
+        )
+    return step
+
+
+def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> None:
+    """Raise ScanError for the first closed curve whose tangents do not lead back to its start."""
+    for i, curve in enumerate(curves):
+        missing = measured.displacement(i)
+        if curve.closed and missing > _OPEN_GAP * curve.length:
+            raise ScanError(
+                f"{curve_name(curve.index)} is marked as closed, but ends {missing:.3g} m from where it began "
+                f"({100 * missing / curve.length:.0f} % of its length)"
+            )
+
+
+def _weights(parameters: NetworkParameters, automatic: Weights) -> Weights:
+    if parameters.weights == "thesis":
+        return Weights(1.0, 1.0)
+    if parameters.stretch is None and parameters.bend is None:
+        return automatic
+    return Weights(parameters.stretch or 0.0, parameters.bend or 0.0)
+
+
+def reconstruct_network(
+    scan: Scan, parameters: NetworkParameters | None = None, progress: Progress | None = None
+) -> NetworkResult:
+    """Curve network of a scan; raises ScanError naming the curve, and whatever `progress` raises between stages."""
+    return NetworkReconstruction(scan, parameters, progress).solve()

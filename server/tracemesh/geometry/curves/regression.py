@@ -1,0 +1,96 @@
+"""Smooth frames with common normals at nodes: Levenberg-Marquardt on SO(3)^n (thesis 3.5.4).
+
+The sparsity pattern is found once, the factorisation's ordering too; a solver that is kept starts from where it ended,
+which makes a change of weights cheap. Near the minimum the last factorisation is used again: its steps still shrink the
+error a hundredfold, at a third of the price.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import qdldl
+from numpy.typing import NDArray
+
+from tracemesh.geometry.curves.energy import EnergyPoint, Weights, pattern_of
+from tracemesh.geometry.curves.samples import Layout
+from tracemesh.geometry.curves.stencil import Stencil
+from tracemesh.geometry.rotations import exp
+
+Floats = NDArray[np.float64]
+
+_STEP = 1e-9  # rad; a smaller step ends the iteration
+_NEAR = 3e-3  # rad; after a smaller step the nodes get their full stiffness and the factorisation is kept
+_SOFTENING = 0.01  # of the nodes' stiffness while far away: stiff ones let frames move along narrow valleys only
+_SLOW = 0.1  # a kept factorisation is renewed when steps shrink less than this
+_TRIALS = 100
+_DAMPING = 1e-3  # of the Hessian's diagonal, once a step failed
+_ROUNDING = 1e-12  # relative; energies that differ less are the same
+
+
+@dataclass(frozen=True)
+class Regression:
+    """frames: (n, 3, 3) at a layout's rows. energy: at them, m. iterations: how many steps were tried."""
+
+    frames: Floats
+    energy: float
+    iterations: int
+
+
+class RegressionSolver:
+    """Minimises the energy of one layout for changing data and weights."""
+
+    def __init__(self, layout: Layout) -> None:
+        """Find the pattern."""
+        self._stencil = Stencil(layout)
+        self._pattern = pattern_of(self._stencil)
+        self._factors: qdldl.Solver | None = None
+        self._last: Floats | None = None
+
+    def solve(self, frames: Floats, weights: Weights, start: Floats | None = None) -> Regression:
+        """Minimiser for data frames (n, 3, 3) at the layout's rows.
+
+        Started from the solution before, at first from `start` (n, 3, 3) or the data.
+        """
+        data = frames[self._stencil.representative]
+        if self._last is None:
+            self._last = (frames if start is None else start)[self._stencil.representative]
+        soft = EnergyPoint(self._stencil, self._last, data, weights, _SOFTENING)
+        near, first = self._descend(soft, data, weights, _SOFTENING, _NEAR)
+        stiff = EnergyPoint(self._stencil, near.frames, data, weights)
+        found, second = self._descend(stiff, data, weights, 1.0, _STEP)
+        self._last = found.frames
+        return Regression(found.frames[self._stencil.row], found.value, first + second)
+
+    def _descend(
+        self, point: EnergyPoint, data: Floats, weights: Weights, softening: float, least: float
+    ) -> tuple[EnergyPoint, int]:
+        """Steps, and their number, until one is smaller than `least` rad."""
+        damping, size, renew = 0.0, np.inf, True
+        for trial in range(1, _TRIALS):
+            if renew:
+                self._factorise(point, damping)
+            step = -self._solved(point.gradient().ravel()).reshape(-1, 3)
+            moved = EnergyPoint(self._stencil, point.frames @ exp(step), data, weights, softening)
+            before, size = size, float(np.abs(step).max())
+            if moved.value <= point.value + _ROUNDING * abs(point.value):
+                point, damping = moved, damping / 10 if damping > _DAMPING else 0.0
+                renew = not (size < _NEAR and (renew or size < _SLOW * before))
+            else:
+                damping, renew = max(10 * damping, _DAMPING), True
+            if size < least:
+                return point, trial
+        return point, _TRIALS
+
+    def _factorise(self, point: EnergyPoint, damping: float) -> None:
+        matrix = self._pattern.matrix
+        matrix.data = self._pattern.entries(point.hessian_blocks())
+        matrix.data[self._pattern.diagonal] *= 1 + damping
+        if self._factors is None:
+            self._factors = qdldl.Solver(matrix, upper=True)
+        else:
+            self._factors.update(matrix, upper=True)
+
+    def _solved(self, right: Floats) -> Floats:
+        assert self._factors is not None
+        result: Floats = self._factors.solve(right)
+        return result

@@ -1,0 +1,1 @@
+"""Nodes that nobody marked, found from the curves' shapes."""

@@ -1,0 +1,1 @@
+"""What a device's numbers mean: vectors to frames, ticks and times to distances."""

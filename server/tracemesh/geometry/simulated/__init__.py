@@ -1,0 +1,1 @@
+"""Shapes that are known exactly, and a device that scans them."""

@@ -1,0 +1,1 @@
+"""From a curve network to a surface (thesis chapter 4)."""

@@ -1,0 +1,216 @@
+"""Validation of a curve network as the cell complex that a surface needs (thesis definition 2.31).
+
+Every error names a segment by the nodes at its ends ("segment 3-7 of curve 1") and says what would mend it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from tracemesh.errors import NetworkError
+from tracemesh.geometry.network import CurveNetwork, Ints, Segment
+from tracemesh.geometry.scan import curve_name
+from tracemesh.geometry.surfaces.bridges import partners
+from tracemesh.geometry.surfaces.cycles import Cycle, loop_points, trace_cycles
+
+# An opening seen from outside turns by -2 pi if the surface around it is flat, and by more the more it curves inwards.
+# Below this, rad, a cycle of an untagged network is taken for an opening: a face would need more curvature than a
+# sphere's half.
+OPENING_TURN = -0.5
+UNIT_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class CellComplex:
+    """A network whose every segment bounds one face (boundary) or two.
+
+    network: as given, with inferred boundary tags. faces: cycles to be spanned. partners: faces, by index, that are the
+    two loops of one face. openings: cycles that stay open.
+    inferred: whether the boundary was found instead of given.
+    """
+
+    network: CurveNetwork
+    faces: tuple[Cycle, ...]
+    partners: dict[int, int]
+    openings: tuple[Cycle, ...]
+    inferred: bool
+
+    def resampled(self, network: CurveNetwork) -> "CellComplex":
+        """The same complex over a network whose segments have other points."""
+        faces = tuple(replace(face, points=loop_points(network, face.sides)) for face in self.faces)
+        return replace(self, network=network, faces=faces)
+
+
+def cell_complex(network: CurveNetwork) -> CellComplex:
+    """The faces and openings of a network.
+
+    Raises NetworkError, naming the segment, if the arrays are malformed, a segment dangles, or the boundary tags
+    contradict
+    the faces. If no segment is tagged as boundary, cycles that turn clockwise are taken for openings.
+    """
+    _check_arrays(network)
+    _check_segments(network)
+    _check_ends(network)
+    cycles = trace_cycles(network)
+    pieces = _pieces(network)
+    paired = partners(network, cycles) if pieces.max() > 0 else {}
+    inferred = not any(segment.boundary for segment in network.segments)
+    if inferred:
+        network = _with_inferred_boundary(network, [c for k, c in enumerate(cycles) if k not in paired])
+        inferred = any(segment.boundary for segment in network.segments)
+    openings = _openings(network, cycles, paired)
+    faces = [number for number in range(len(cycles)) if number not in openings]
+    _check_tags(network, tuple(cycles[number] for number in faces))
+    place = {number: k for k, number in enumerate(faces)}
+    loops = {place[a]: place[b] for a, b in paired.items() if a in place and b in place}
+    complex_ = CellComplex(
+        network, tuple(cycles[k] for k in faces), loops, tuple(cycles[k] for k in sorted(openings)), inferred
+    )
+    _check_connected(complex_, pieces)
+    return complex_
+
+
+def segment_name(network: CurveNetwork, index: int) -> str:
+    """A segment as a person finds it: the numbers of its end nodes and of its curve."""
+    segment = network.segments[index]
+    numbers = {int(point): number for number, point in enumerate(network.nodes)}
+    if segment.points[0] == segment.points[-1] and int(segment.points[0]) not in numbers:
+        return f"closed {curve_name(segment.curve)}"
+    first, last = (numbers.get(int(segment.points[end]), "?") for end in (0, -1))
+    return f"segment {first}-{last} of {curve_name(segment.curve)}"
+
+
+def _check_arrays(network: CurveNetwork) -> None:
+    points, normals = network.points, network.normals
+    if points.ndim != 2 or points.shape[1:] != (3,) or normals.shape != points.shape:
+        raise NetworkError(f"wanted points and normals of one shape (n, 3), got {points.shape} and {normals.shape}")
+    if not network.segments:
+        raise NetworkError("the network has no segments: there is nothing to span a surface over")
+    for name, array in (("position", points), ("normal", normals)):
+        bad = np.flatnonzero(~np.isfinite(array).all(1))
+        if len(bad):
+            raise NetworkError(f"the {name} of point {bad[0]} is not finite: {array[bad[0]].tolist()}")
+    off = np.flatnonzero(np.abs(np.linalg.norm(normals, axis=1) - 1) > UNIT_TOLERANCE)
+    if len(off):
+        raise NetworkError(f"the normal of point {off[0]} has length {np.linalg.norm(normals[off[0]]):.4g}, wanted 1")
+
+
+def _check_segments(network: CurveNetwork) -> None:
+    """Indices in range, no zero-length edge, and no two segments that share a point inside."""
+    count = len(network.points)
+    uses = np.zeros(count, np.int64)
+    for index, segment in enumerate(network.segments):
+        points = segment.points
+        if len(points) < 2 or points.min() < 0 or points.max() >= count:
+            raise NetworkError(
+                f"segment number {index}: wanted two or more point indices below {count}, got {points.tolist()[:8]}"
+            )
+        closed = points[0] == points[-1]
+        if closed and len(points) < 4:
+            raise NetworkError(
+                f"{segment_name(network, index)} closes after {len(points) - 1} points, wanted three or more"
+            )
+        lengths = np.linalg.norm(np.diff(network.points[points], axis=0), axis=1)
+        if not lengths.all():
+            raise NetworkError(
+                f"{segment_name(network, index)} repeats a position at point {points[int(lengths.argmin())]}: remove it"
+            )
+        np.add.at(uses, points[1:-1], 1)
+    ends = np.unique([segment.points[[0, -1]] for segment in network.segments])
+    uses[ends] += 1
+    if len(stray := np.flatnonzero(uses != 1)):
+        word = (
+            "belongs to no segment"
+            if uses[stray[0]] == 0
+            else "lies on two segments without being an end of both: mark a node there"
+        )
+        raise NetworkError(f"point {stray[0]} {word}")
+
+
+def _check_ends(network: CurveNetwork) -> None:
+    """Every end of a segment meets another one."""
+    ends = np.array([segment.points[[0, -1]] for segment in network.segments])
+    degree = np.bincount(ends.ravel(), minlength=len(network.points))
+    dangling = np.argwhere(degree[ends] == 1)
+    if len(dangling):
+        index, end = dangling[0]
+        at = "begins" if end == 0 else "ends"
+        raise NetworkError(
+            f"{segment_name(network, index)} {at} where no other curve meets it: "
+            "mark the node where it should, or remove it"
+        )
+
+
+def _with_inferred_boundary(network: CurveNetwork, cycles: list[Cycle]) -> CurveNetwork:
+    outer = {side.segment for cycle in cycles if cycle.turning < OPENING_TURN for side in cycle.sides}
+    segments = tuple(
+        Segment(segment.points, index in outer, segment.curve) for index, segment in enumerate(network.segments)
+    )
+    return replace(network, segments=segments)
+
+
+def _pieces(network: CurveNetwork) -> Ints:
+    """(number of segments,) number of the connected piece of curves that a segment belongs to."""
+    count = len(network.points)
+    ends = np.array([(segment.points[0], segment.points[-1]) for segment in network.segments])
+    graph = sparse.coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (count, count))
+    labels = csgraph.connected_components(graph, directed=False)[1][ends[:, 0]]
+    return np.unique(labels, return_inverse=True)[1]
+
+
+def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...], paired: dict[int, int]) -> set[int]:
+    """Cycles along boundary segments only. Of the two sides of a lone closed boundary curve, the one that faces no
+    other
+    curve, or else the one that turns less.
+    """
+    candidates = [
+        number for number, c in enumerate(cycles) if all(network.segments[side.segment].boundary for side in c.sides)
+    ]
+    openings: set[int] = set()
+    taken: set[int] = set()
+    for number in sorted(candidates, key=lambda k: (k in paired, cycles[k].turning)):
+        segments = {side.segment for side in cycles[number].sides}
+        if taken.isdisjoint(segments):
+            openings.add(number)
+            taken |= segments
+    return openings
+
+
+def _check_connected(complex_: CellComplex, pieces: Ints) -> None:
+    """Every piece of the network is joined to the others by faces with two loops."""
+    pairs = [[pieces[complex_.faces[k].sides[0].segment] for k in pair] for pair in complex_.partners.items()]
+    first, second = np.array(pairs, np.int64).reshape(-1, 2).T
+    size = int(pieces.max()) + 1
+    graph = sparse.coo_matrix((np.ones(len(first)), (first, second)), (size, size))
+    joined = csgraph.connected_components(graph, directed=False)[1]
+    apart = np.flatnonzero(joined != joined[0])
+    if len(apart):
+        here, there = (segment_name(complex_.network, int(np.argmax(pieces == piece))) for piece in (0, apart[0]))
+        raise NetworkError(f"no curve and no face connects {here} and {there}: connect them by a curve")
+
+
+def _check_tags(network: CurveNetwork, faces: tuple[Cycle, ...]) -> None:
+    """Boundary segments bound one face, the others two."""
+    count = np.zeros(len(network.segments), np.int64)
+    for face in faces:
+        np.add.at(count, [side.segment for side in face.sides], 1)
+    wanted = np.array([1 if segment.boundary else 2 for segment in network.segments])
+    wrong = np.flatnonzero(count != wanted)
+    if not len(wrong):
+        return
+    index = int(wrong[0])
+    # A boundary with faces on both sides usually means that another stretch of the same opening is not tagged.
+    around = min(
+        (face for face in faces if any(side.segment == index for side in face.sides)), key=lambda face: face.turning
+    )
+    untagged = [side.segment for side in around.sides if not network.segments[side.segment].boundary]
+    if around.turning < OPENING_TURN and untagged:
+        raise NetworkError(
+            f"{segment_name(network, untagged[0])} lies beside an opening and belongs to "
+            "one face only: mark it as boundary?"
+        )
+    raise NetworkError(
+        f"{segment_name(network, index)} is marked as boundary but has a face on both sides: mark it as interior?"
+    )

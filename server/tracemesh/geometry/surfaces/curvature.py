@@ -1,0 +1,47 @@
+"""Mean curvature from positions and propagated normals (thesis section 4.5.2, Eq. 4.18), with its sign.
+
+The printed -|H| N bends every patch outwards; the component along the normal keeps saddles and hollows.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracemesh.geometry.network import Floats, Ints
+from tracemesh.geometry.surfaces.laplacian import lumped_mass, triangle_areas
+
+
+def mean_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
+    """(n,) 1/m, mean of the principal curvatures, 1/r on a sphere of radius r with outward normals.
+
+    vertices, normals: (n, 3). faces: (f, 3). The curvature vector -2 H N is the sum of (edge opposite of the vertex) x
+    (mean normal of the face) over the faces around a vertex, over twice its mass. Not defined on an open boundary,
+    where the sum lacks faces.
+    """
+    corners = vertices[faces]
+    facing = normalised(normals[faces].sum(1))
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    flux = 0.5 * (np.cross(opposite, facing[:, None]) * normals[faces]).sum(2)
+    total = np.bincount(faces.ravel(), flux.ravel(), len(vertices))
+    return np.asarray(-0.5 * total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
+
+
+def extended_to_boundary(values: Floats, faces: Ints, open_boundary: NDArray[np.bool_]) -> Floats:
+    """(n,) values with those on the open boundary replaced by the mean of their neighbours', inside ones first.
+
+    values, open_boundary: (n,). faces: (f, 3).
+    """
+    values, known = values.copy(), ~open_boundary
+    start, end = (np.roll(faces, -k, axis=1).ravel() for k in range(2))
+    one, other = np.concatenate([start, end]), np.concatenate([end, start])
+    for _ in range(2):  # the tip of an acute corner has neighbours on the boundary only
+        weight = np.bincount(one, known[other], len(values))
+        mean = np.bincount(one, values[other] * known[other], len(values)) / np.maximum(weight, 1)
+        new = ~known & (weight > 0)
+        values[new], known = mean[new], known | new
+    return values
+
+
+def normalised(vectors: Floats) -> Floats:
+    """(..., 3) unit vectors; a zero vector stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1.0))

@@ -1,0 +1,170 @@
+"""Triangulation of every patch of a network in a plane (thesis section 4.4.2)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracemesh.errors import SurfaceError
+from tracemesh.geometry.network import CurveNetwork, Floats, Ints
+from tracemesh.geometry.surfaces.bridges import Outline, joined_outline, plain_outline
+from tracemesh.geometry.surfaces.cell_complex import CellComplex, segment_name
+from tracemesh.geometry.surfaces.curvature import normalised
+from tracemesh.geometry.surfaces.edges import unique_edges
+from tracemesh.geometry.surfaces.flattening import flatten
+from tracemesh.geometry.surfaces.planar_maps import (
+    SMALLEST_AVERAGE,
+    develop,
+    map_to_circle,
+    project_to_plane,
+    signed_area,
+)
+from tracemesh.geometry.surfaces.quality import inverted_faces, triangle_angles
+from tracemesh.geometry.surfaces.triangulation import triangulate_polygon
+
+LARGEST_STRETCH = 2.0  # of a boundary in the plane; more says that the surface it was unrolled from went astray
+
+
+@dataclass(frozen=True)
+class PatchMesh:
+    """Triangulation of all patches, without positions of the interior vertices.
+
+    planar: (p, 2) m, every patch in its own plane: its boundary, then its interior points. planar_faces: (f, 3) indices
+    into
+    planar. vertex: (p,) the mesh vertex of a planar point; the first `fixed` of `count` vertices are the network's
+    points.
+    patch: (f,) number of the face's cycle. starts: (number of cycles,) first planar point of every patch.
+    lift: (count, 3) which way normals go inside patches whose boundary normals cancel out, like a hemisphere's; else 0.
+    """
+
+    planar: Floats
+    planar_faces: Ints
+    vertex: Ints
+    patch: Ints
+    starts: Ints
+    lift: Floats
+    fixed: int
+    count: int
+
+    @property
+    def faces(self) -> Ints:
+        """(f, 3) indices of mesh vertices."""
+        return self.vertex[self.planar_faces]
+
+
+def triangulate_patches(
+    complex_: CellComplex, spacing: float | None, coarsening: float, last: tuple[PatchMesh, Floats] | None = None
+) -> PatchMesh:
+    """Triangulate every face of a cell complex.
+
+    spacing: edge length inside, m; None takes each patch's own boundary spacing. coarsening: factor on it.
+    last: a triangulation with vertices (n, 3) whose patches are unrolled to be triangulated again; None projects along
+    average normals. Raises SurfaceError, naming the patch, if one cannot be triangulated.
+    """
+    network, outlines = complex_.network, outlines_of(complex_)
+    unrolled = [None] * len(outlines) if last is None else _unrolled_loops(outlines, *last)
+    pieces = [
+        _triangulate(network, outline, spacing, coarsening, loop)
+        for outline, loop in zip(outlines, unrolled, strict=True)
+    ]
+    mesh = _numbered(outlines, pieces, len(network.points))
+    _check_manifold(mesh.faces)
+    return mesh
+
+
+def _numbered(outlines: list[Outline], pieces: list[tuple[Floats, Floats, Ints]], fixed: int) -> PatchMesh:
+    """Patches as one mesh: the network's points, then those of slits, then those inside of every patch."""
+    count = max(fixed, 1 + max(int(outline.vertex.max()) for outline in outlines))
+    inside = [len(points) for _, points, _ in pieces]
+    size = [len(loop) + m for (loop, _, _), m in zip(pieces, inside, strict=True)]
+    starts = np.concatenate([[0], np.cumsum(size)[:-1]])
+    first = count + np.concatenate([[0], np.cumsum(inside)[:-1]])
+    vertex = [np.append(o.vertex, k + np.arange(m)) for o, k, m in zip(outlines, first, inside, strict=True)]
+    lift = [np.tile(_lift(o), (m, 1)) for o, m in zip(outlines, inside, strict=True)]
+    return PatchMesh(
+        planar=np.vstack([part for loop, points, _ in pieces for part in (loop, points)]),
+        planar_faces=np.vstack([faces + k for (_, _, faces), k in zip(pieces, starts, strict=True)]),
+        vertex=np.concatenate(vertex),
+        patch=np.repeat(np.arange(len(pieces)), [len(faces) for _, _, faces in pieces]),
+        starts=starts,
+        lift=np.vstack([np.zeros((count, 3)), *lift]),
+        fixed=fixed,
+        count=count + sum(inside),
+    )
+
+
+def _check_manifold(faces: Ints) -> None:
+    """Acute corners on both sides of a curve may be cut along the same chord."""
+    edges, count = unique_edges(faces)
+    if count.max() > 2:
+        a, b = edges[count.argmax()]
+        raise SurfaceError(
+            f"the patches on both sides of points {a} and {b} of the network cut the same corner: add points"
+        )
+
+
+def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool:
+    """Whether triangles in space are nearly as well shaped as in the plane, and none is turned over. vertices:
+    (n, 3).
+    """
+    flat = np.column_stack([patches.planar, np.zeros(len(patches.planar))])
+    in_plane = triangle_angles(flat, patches.planar_faces).min(1)
+    in_space = triangle_angles(vertices, patches.faces).min(1)
+    enough = np.minimum(0.75 * in_plane, np.radians(20))
+    return bool((in_space >= enough).all()) and not inverted_faces(vertices, patches.faces, normals).any()
+
+
+def outlines_of(complex_: CellComplex) -> list[Outline]:
+    """Outline of every face; a face with two loops counts as the first of them."""
+    network, outlines = complex_.network, []
+    next_vertex = len(network.points)
+    for number, cycle in enumerate(complex_.faces):
+        other = complex_.partners.get(number)
+        if other is None:
+            outlines.append(plain_outline(network, cycle))
+        elif number < other:
+            outlines.append(joined_outline(network, cycle, complex_.faces[other], next_vertex))
+            next_vertex = max(next_vertex, int(outlines[-1].vertex.max()) + 1)
+    return outlines
+
+
+def _perimeter(loop: Floats) -> float:
+    """m, length of a closed polygon (k, 2 or 3)."""
+    return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
+
+
+def _lift(outline: Outline) -> Floats:
+    """(3,) direction that the normals inside a patch take where those on its boundary cancel out: that of its area."""
+    if np.linalg.norm(outline.normals.mean(0)) > SMALLEST_AVERAGE:
+        return np.zeros(3)
+    return normalised(np.cross(outline.points, np.roll(outline.points, -1, axis=0)).sum(0))
+
+
+def _unrolled_loops(outlines: list[Outline], patches: PatchMesh, vertices: Floats) -> list[Floats | None]:
+    """Boundaries of all patches, unrolled from space into the plane."""
+    planar = flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)
+    return [planar[start : start + len(o.points)] for start, o in zip(patches.starts, outlines, strict=True)]
+
+
+def _triangulate(
+    network: CurveNetwork, outline: Outline, spacing: float | None, coarsening: float, unrolled: Floats | None
+) -> tuple[Floats, Floats, Ints]:
+    """Loop in the plane, interior points and faces of one patch; the first map to the plane that is injective."""
+    points, normals = outline.points, outline.normals
+    size = spacing or _perimeter(points) / len(points)
+    reason = "its boundary turns the wrong way"
+    maps: tuple[Callable[[], Floats | None], ...] = (
+        lambda: unrolled,
+        lambda: project_to_plane(points, normals),
+        lambda: develop(points, normals),
+        lambda: map_to_circle(points),
+    )
+    for plane_map in maps:
+        loop = plane_map()
+        try:
+            if loop is not None and signed_area(loop) > 0 and _perimeter(loop) < LARGEST_STRETCH * _perimeter(points):
+                return loop, *triangulate_polygon(loop, size * coarsening)
+        except SurfaceError as error:
+            reason = str(error)
+    name = segment_name(network, outline.cycle.sides[0].segment)
+    raise SurfaceError(f"the patch beside {name} cannot be triangulated: {reason}")
