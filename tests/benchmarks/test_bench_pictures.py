@@ -4,8 +4,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("matplotlib", reason="matplotlib is installed by make bench alone")
-
 
 @pytest.mark.filterwarnings("ignore:.*deprecated:DeprecationWarning")
 def test_a_plot_and_a_surface_are_drawn(tmp_path: Path) -> None:
