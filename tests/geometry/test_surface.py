@@ -16,10 +16,10 @@ from tests.geometry.network_fixtures import octants, radial, rings, sideways, up
 from tracemesh.errors import Cancelled, SurfaceError, TracemeshError
 from tracemesh.formats.networks import read_network
 from tracemesh.geometry.mesh import Mesh
-from tracemesh.geometry.network import CurveNetwork, Floats
+from tracemesh.geometry.network import CurveNetwork, Floats, Segment
 from tracemesh.geometry.surfaces.edges import unique_edges
 from tracemesh.geometry.surfaces.quality import mesh_quality
-from tracemesh.geometry.surfaces.subdivision import subdivided
+from tracemesh.geometry.surfaces.subdivision import STEEPEST, graded, subdivided
 from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 
 EULER = {
@@ -145,6 +145,44 @@ def test_subdivided_points_lie_on_the_curves() -> None:
     np.testing.assert_allclose(fine.normals, radial(fine.points), atol=1e-3)
     lengths = [np.linalg.norm(np.diff(fine.points[s.points], axis=0), axis=1).max() for s in fine.segments]
     assert max(lengths) < 0.051
+
+
+def near_crossing(gap: float) -> CurveNetwork:
+    """A unit disk cut by three chords that nearly meet in its middle: a triangle with sides of `gap` remains there."""
+    turn = np.pi / 6 + np.pi / 3 * np.arange(6)
+    rim = np.column_stack([np.cos(turn), np.sin(turn)])
+    small = gap / np.sqrt(3) * np.column_stack([np.cos(turn[::2] + np.pi / 6), np.sin(turn[::2] + np.pi / 6)])
+    chords = [(k, 6 + k // 2 if k % 2 else 6 + (k // 2 + 2) % 3) for k in range(6)] + [(6, 7), (7, 8), (8, 6)]
+    points, segments = [*rim, *small], []
+    for curve, (a, b) in enumerate([(k, (k + 1) % 6) for k in range(6)] + chords):
+        parts = max(round(float(np.linalg.norm(points[b] - points[a])) / 0.1), 1)
+        inner = points[a] + np.arange(1, parts)[:, None] / parts * (points[b] - points[a])
+        segments.append(Segment(np.array([a, *range(len(points), len(points) + len(inner)), b]), curve < 6, curve))
+        points += [*inner]
+    flat = np.column_stack([points, np.zeros(len(points))])
+    return CurveNetwork(flat, np.tile([0.0, 0.0, 1.0], (len(flat), 1)), np.arange(9), tuple(segments))
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.005, 0.0005])
+def test_curves_that_nearly_cross_leave_no_slivers(gap: float) -> None:
+    network = near_crossing(gap)
+    result = span_surface(network, FAST)
+    assert_oriented_manifold(result.mesh)
+    np.testing.assert_array_equal(result.mesh.vertices[: len(network.points)], network.points)
+    assert float(str(result.report["min_angle_deg"])) > 18
+
+
+def test_graded_edges_are_never_much_longer_than_those_they_meet() -> None:
+    network = near_crossing(0.0005)
+    fine = graded(network)
+    np.testing.assert_array_equal(fine.points[: len(network.points)], network.points)
+    ends = np.concatenate([np.column_stack([s.points[:-1], s.points[1:]]) for s in fine.segments])
+    length = np.linalg.norm(fine.points[ends[:, 0]] - fine.points[ends[:, 1]], axis=1)
+    shortest = [length[(ends == p).any(1)].min() for p in range(len(fine.points))]
+    assert (length <= STEEPEST * np.array(shortest)[ends].min(1)).all()
+    assert graded(fine) is fine
+    even = octants(0.2)
+    assert graded(even) is even
 
 
 def test_soft_constraints_halve_the_noise() -> None:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from tracemesh.errors import SurfaceError
 from tracemesh.geometry.network import Floats, Ints
+from tracemesh.geometry.surfaces.opening import opened
 from tracemesh.geometry.surfaces.planar_maps import develop, map_to_circle, project_to_plane, signed_area
 from tracemesh.geometry.surfaces.quality import triangle_angles
 from tracemesh.geometry.surfaces.triangulation import triangulate_polygon
@@ -103,3 +104,16 @@ def test_maps_of_a_planar_loop_are_isometric() -> None:
 def test_normals_that_cancel_out_have_no_projection() -> None:
     points = np.column_stack([circle(30), np.zeros(30)])
     assert project_to_plane(points, points) is None
+
+
+def test_opening_angles_never_narrows_them_nor_moves_what_is_fixed() -> None:
+    loop = circle(24)
+    inside, faces = triangulate_polygon(loop, 0.26)
+    random = np.random.default_rng(1)
+    points = np.vstack([loop, inside + random.uniform(-0.1, 0.1, inside.shape)])
+    assert (areas(points, faces) > 0).all()
+    moved = opened(points, faces, len(loop))
+    np.testing.assert_array_equal(moved[: len(loop)], loop)
+    assert_valid(loop, moved[len(loop) :], faces)
+    assert smallest_angle(points, faces) < 17
+    assert smallest_angle(moved, faces) > 20

@@ -1,4 +1,4 @@
-"""A curve network with more points on its segments, for meshes finer than the network itself."""
+"""A curve network with more points on its segments, for meshes finer than the network itself or finer in places."""
 
 from dataclasses import replace
 
@@ -8,36 +8,71 @@ from scipy.interpolate import CubicSpline
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints, Segment
 from tracemesh.geometry.surfaces.curvature import normalised
 
+STEEPEST = 4.0  # an edge over the shortest at its ends; with more, no triangles between them have wide angles
+_ROUNDS = 6  # each takes the root of what edges are too long by
+
 
 def subdivided(network: CurveNetwork, spacing: float) -> CurveNetwork:
     """The network with every edge longer than the spacing (m) divided evenly; new points come after the given ones.
 
     Positions and normals of the new points lie on the cubic spline through their segment's.
     """
+    _, lengths = _edges(network)
+    parts = np.maximum(np.ceil(lengths / spacing - 1e-6), 1).astype(np.int64)
+    edge = np.repeat(np.arange(len(parts)), parts - 1)
+    return _inserted(network, edge, np.concatenate([np.arange(1, p) / p for p in parts]))
+
+
+def graded(network: CurveNetwork) -> CurveNetwork:
+    """The network with edges divided that are more than `STEEPEST` times as long as the shortest that they meet.
+
+    Curves that cross in almost one point leave such edges: triangles over them would be slivers, whatever is inside.
+    New points come after the given ones, on the splines of `subdivided`; a network without such edges is returned.
+    """
+    for _ in range(_ROUNDS):
+        ends, lengths = _edges(network)
+        shortest = np.full(len(network.points), np.inf)
+        np.minimum.at(shortest, ends, lengths[:, None])
+        beside = shortest[ends]
+        long = np.flatnonzero(lengths > STEEPEST * beside.min(1))
+        if not len(long):
+            break
+        share = np.sqrt(beside.min(1)[long] / lengths[long])
+        network = _inserted(network, long, np.where(beside.argmin(1)[long] == 0, share, 1 - share))
+    return network
+
+
+def _edges(network: CurveNetwork) -> tuple[Ints, Floats]:
+    """Points (e, 2) and lengths (e,), m, of the edges of all segments."""
+    ends = np.concatenate([np.column_stack([s.points[:-1], s.points[1:]]) for s in network.segments])
+    return ends, np.linalg.norm(network.points[ends[:, 1]] - network.points[ends[:, 0]], axis=1)
+
+
+def _inserted(network: CurveNetwork, edge: Ints, share: Floats) -> CurveNetwork:
+    """The network with new points at shares (m,) of edges (m,), which are in order."""
     points, normals, segments = [network.points], [network.normals], []
-    count = len(network.points)
+    count, first = len(network.points), 0
     for segment in network.segments:
-        between, facing, parts = _points_between(network, segment, spacing)
+        last = first + len(segment.points) - 1
+        own = slice(*np.searchsorted(edge, [first, last]))
+        between, facing = _on_spline(network, segment, edge[own] - first, share[own])
         new = count + np.arange(len(between))
-        segments.append(
-            replace(segment, points=np.insert(segment.points, np.repeat(1 + np.arange(len(parts)), parts - 1), new))
-        )
+        segments.append(replace(segment, points=np.insert(segment.points, 1 + edge[own] - first, new)))
         points.append(between)
         normals.append(facing)
-        count += len(between)
+        count, first = count + len(between), last
     return replace(network, points=np.vstack(points), normals=np.vstack(normals), segments=tuple(segments))
 
 
-def _points_between(network: CurveNetwork, segment: Segment, spacing: float) -> tuple[Floats, Floats, Ints]:
-    """Positions and normals of the new points of one segment, and the number of parts of every edge."""
+def _on_spline(network: CurveNetwork, segment: Segment, edge: Ints, share: Floats) -> tuple[Floats, Floats]:
+    """Positions and normals (m, 3) at shares of a segment's edges."""
+    if not len(edge):
+        return np.empty((0, 3)), np.empty((0, 3))
     points, normals = network.points[segment.points], network.normals[segment.points]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    parts = np.maximum(np.ceil(lengths / spacing - 1e-6), 1).astype(np.int64)
     knots = np.concatenate([[0.0], np.cumsum(lengths)])
     values = np.column_stack([points, normals])
     closed = segment.points[0] == segment.points[-1]
     spline = CubicSpline(knots, values, bc_type="periodic") if closed else CubicSpline(knots, values)
-    step = np.concatenate([np.arange(1, p) / p for p in parts])
-    at = np.repeat(knots[:-1], parts - 1) + step * np.repeat(lengths, parts - 1)
-    values = np.asarray(spline(at))
-    return values[:, :3], normalised(values[:, 3:]), parts
+    values = np.asarray(spline(knots[edge] + share * lengths[edge]))
+    return values[:, :3], normalised(values[:, 3:])

@@ -19,7 +19,7 @@ from tracemesh.geometry.surfaces.patches import PatchMesh, triangulate_patches, 
 from tracemesh.geometry.surfaces.quality import inverted_faces, mesh_quality
 from tracemesh.geometry.surfaces.refinement import refine
 from tracemesh.geometry.surfaces.soft_constraints import softened_points
-from tracemesh.geometry.surfaces.subdivision import subdivided
+from tracemesh.geometry.surfaces.subdivision import graded, subdivided
 
 Progress = Callable[[str, float], None]
 COARSE = 3.0  # edges inside the patches of the first solve, which only serves to unroll them, over those of the mesh
@@ -83,12 +83,13 @@ class Stages:
 
 
 def prepared(network: CurveNetwork, parameters: SurfaceParameters, stages: Stages) -> CellComplex:
-    """The cell complex of a network at the wanted mesh size. Raises NetworkError."""
+    """The cell complex of a network, its edges evened and as fine as wanted. Raises NetworkError."""
     stages.begin("cycles", 0.0)
     complex_ = cell_complex(network)
-    if parameters.mesh_size is None:
-        return complex_
-    return complex_.resampled(subdivided(complex_.network, parameters.mesh_size))
+    finer = graded(complex_.network)
+    if parameters.mesh_size is not None:
+        finer = subdivided(finer, parameters.mesh_size)
+    return complex_ if finer is complex_.network else complex_.resampled(finer)
 
 
 def finished(

@@ -12,12 +12,14 @@ from scipy.spatial import cKDTree
 
 from tracemesh.errors import SurfaceError
 from tracemesh.geometry.network import Floats, Ints
+from tracemesh.geometry.surfaces.opening import half_disk, opened, smallest_angles
 
 CLEARANCE = 0.62  # smallest distance of a lattice point to the boundary, in lattice spacings
 GROWTH = 0.5  # of the spacing per distance from the boundary, where the inside is coarser
 SHORT = 0.5  # an edge over the longer one beside it
 MOST_POINTS = 3e6  # of one patch
 RELAXATIONS = 2  # of two smoothing steps each
+OPENINGS = 4  # rounds of moving points of small angles
 
 
 def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
@@ -43,7 +45,8 @@ def triangulate_polygon(loop: Floats, spacing: float) -> tuple[Floats, Ints]:
     for _ in range(RELAXATIONS if len(inside) else 0):
         inside = _smoothed(fixed, _smoothed(fixed, inside, faces), faces)
         faces = _constrained_delaunay(len(loop), np.vstack([fixed, inside]))
-    inside, faces = _without_strays(len(loop), np.vstack([fixed[len(loop) :], inside]), faces)
+    points, faces = _opened(len(loop), np.vstack([fixed, inside]), faces)
+    inside, faces = _without_strays(len(loop), points[len(loop) :], faces)
     return _split_chords(loop, inside, faces)
 
 
@@ -57,30 +60,13 @@ def _points_beside_short_edges(loop: Floats) -> Floats:
     found = np.empty((0, 2))
     for k in np.flatnonzero(length < SHORT * longest):
         corners = loop[[(k + i) % count for i in (-1, 0, 1, 2)]]
-        candidates = corners[1:3].mean(0) + longest[k] * _half_disk(corners[2] - corners[1])
-        angles = np.min([_angles(corners[i], corners[i + 1], candidates) for i in range(3)], axis=0)
+        candidates = corners[1:3].mean(0) + longest[k] * half_disk(corners[2] - corners[1])
+        angles = smallest_angles(corners[:3, None], corners[1:, None], candidates).min(0)
         others = np.delete(loop, [(k + i) % count for i in (-1, 0, 1, 2)], axis=0)
         far = cKDTree(np.vstack([others, found])).query(candidates)[0] > CLEARANCE * longest[k] / 2
         if (angles * far).max() > 0:
             found = np.vstack([found, candidates[np.argmax(angles * far)]])
     return found
-
-
-def _half_disk(direction: Floats) -> Floats:
-    """(m, 2) points of half a disk of radius 1 left of a direction."""
-    radius, turn = (a.ravel() for a in np.meshgrid(np.linspace(0.1, 0.6, 11), np.linspace(0, np.pi, 19)[1:-1]))
-    unit = complex(*direction) / abs(complex(*direction))
-    points = radius * np.exp(1j * turn) * unit
-    return np.column_stack([points.real, points.imag])
-
-
-def _angles(start: Floats, end: Floats, tips: Floats) -> Floats:
-    """(m,) rad, smallest angle of the triangles of an edge and tips (m, 2) left of it; negative for tips right
-    of it.
-    """
-    a, b, c = (complex(*start), complex(*end), tips[:, 0] + 1j * tips[:, 1])
-    angles = np.angle([(c - a) / (b - a), (a - b) / (c - b), (b - c) / (a - c)])
-    return np.asarray(angles.min(0))
 
 
 def _graded_lattice(loop: Floats, fixed: Floats, spacing: float) -> Floats:
@@ -180,6 +166,16 @@ def _smoothed(fixed: Floats, inside: Floats, faces: Ints) -> Floats:
     mean = np.column_stack([np.bincount(faces.ravel(), np.repeat(moment[:, k], 3), len(points)) for k in range(2)])
     weight, mean = weight[len(fixed) :, None], mean[len(fixed) :]
     return np.where(weight > 0, mean / np.where(weight > 0, weight, 1.0), inside)
+
+
+def _opened(count: int, points: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """Points and faces without angles that moving an interior point opens. count: corners of the loop."""
+    for _ in range(OPENINGS):
+        moved = opened(points, faces, count)
+        if np.array_equal(moved, points):
+            break
+        points, faces = moved, _constrained_delaunay(count, moved)
+    return points, faces
 
 
 def _split_chords(loop: Floats, inside: Floats, faces: Ints) -> tuple[Floats, Ints]:
