@@ -16,8 +16,8 @@ from tracemesh_bridge.framing import Frame, FrameLayout, encode
 
 SENSORS = ["accelerometer", "gyroscope", "magnetometer"]
 TICKS_PER_FRAME = 8
-TURN = 6.0
-"""s that the phone takes around the circle."""
+TURN = 12.0
+"""s that the phone takes around the circle: slow, so that it hardly matters that it waits while the server is killed."""
 
 
 class Hand:
