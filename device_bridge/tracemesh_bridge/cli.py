@@ -13,7 +13,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser().parse_args(argv)
     try:
         return int(args.run(args))
-    except TracemeshError as error:
+    except (TracemeshError, OSError) as error:
         print(f"tracemesh-bridge: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -219,9 +219,12 @@ class Cursor:
 
 @contextmanager
 def exclusive(root: Path) -> Iterator[None]:
-    """Hold a folder of spools for oneself. Raises SpoolError if another bridge has it."""
-    root.mkdir(parents=True, exist_ok=True)
-    file = os.open(root / "lock", os.O_RDWR | os.O_CREAT, 0o600)
+    """Hold a folder of spools for oneself. Raises SpoolError if another bridge has it, or it cannot be written."""
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        file = os.open(root / "lock", os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError as error:
+        raise SpoolError(f"cannot use {root} as a spool: {error.strerror}") from error
     try:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -201,9 +201,13 @@ class Uplink:
 
 def ingest_url(server: str) -> str:
     """Where a server takes recordings. Raises BridgeError if the address is none."""
-    parts = urlsplit(server if "//" in server else f"http://{server}")
-    scheme = {"http": "ws", "https": "wss", "ws": "ws", "wss": "wss"}.get(parts.scheme)
-    if scheme is None or not parts.hostname:
+    try:
+        parts = urlsplit(server if "//" in server else f"http://{server}")
+        complete = bool(parts.hostname) and parts.port != 0  # a port that is none raises, too
+    except ValueError:
+        complete = False
+    scheme = {"http": "ws", "https": "wss", "ws": "ws", "wss": "wss"}.get(parts.scheme) if complete else None
+    if scheme is None:
         raise BridgeError(f"wanted a server's address such as http://127.0.0.1:8000, got {server!r}")
     path = parts.path.rstrip("/")
     return urlunsplit((scheme, parts.netloc, path if path.endswith("/ingest") else f"{path}/api/v1/ingest", "", ""))

@@ -112,6 +112,12 @@ def _add_surface(commands: Commands) -> None:
     parser.add_argument("input", metavar="NET.json", help="a network JSON; - reads standard input")
     _add_mesh_output(parser)
     parser.add_argument("--report", type=Path, metavar="REPORT.json", help="also write times, sizes, quality, warnings")
+    parser.add_argument(
+        "--resample",
+        type=float,
+        metavar="STEP",
+        help="first space the points of every curve evenly, about STEP m apart",
+    )
     parser.set_defaults(command=_surface)
 
 
@@ -269,7 +275,7 @@ def _surface(chosen: argparse.Namespace) -> int:
 
     network = read_network(read_text(chosen.input), chosen.input)
     with ProgressLine() as progress:
-        result = span(network, progress)
+        result = span(network, progress, chosen.resample)
     _write_results(chosen, result)
     return 0
 

@@ -11,6 +11,7 @@ from tracemesh.formats.meshes import write_mesh
 from tracemesh.formats.networks import write_network
 from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
 from tracemesh.geometry.curves.sketch import give_lengths
+from tracemesh.geometry.curves.spline_network import resample_network
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.nodes.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
@@ -143,9 +144,13 @@ def _network(scan: Scan, parameters: ReconstructionParameters, progress: Progres
         raise PiecesError(f"{error}; {hint}") from None
 
 
-def span(network: CurveNetwork, progress: Progress | None = None) -> Reconstruction:
-    """Surface over a network that is known already; raises NetworkError or SurfaceError."""
+def span(network: CurveNetwork, progress: Progress | None = None, step: float | None = None) -> Reconstruction:
+    """Surface over a network that is known already; raises NetworkError or SurfaceError.
+
+    step: m between points that the network's curves get first; None leaves its points as they are.
+    """
     begin = perf_counter()
+    network = network if step is None else resample_network(network, step)
     result = _with_surface(
         Reconstruction(network, None, {"generator": _generator()}), SurfaceParameters(), progress or _silent
     )

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,6 +56,42 @@ def test_the_report_says_what_was_used(lilium: Path) -> None:
     assert report["seconds"] > 0
     assert report["network"]["parameters"]["step_m"] > 0
     assert report["surface"]["euler_number"] == 1
+
+
+def without_unused_points(network: dict[str, Any]) -> dict[str, Any]:
+    """The network JSON with only the points that its segments still have."""
+    used = sorted({p for s in network["segments"] for p in s["points"]})
+    number = {p: k for k, p in enumerate(used)}
+    for segment in network["segments"]:
+        segment["points"] = [number[p] for p in segment["points"]]
+    kept = {name: [network[name][p] for p in used] for name in ("points", "normals")}
+    return {**network, **kept, "nodes": [number[p] for p in network["nodes"]]}
+
+
+def test_an_uneven_network_is_resampled_first(lilium: Path, shared_data: Path, tmp_path: Path) -> None:
+    """Of the network's points between nodes one in three is kept; splines give back what the surface needs."""
+    network = json.loads((lilium / "network.json").read_text())
+    for segment in network["segments"]:
+        points = segment["points"]
+        segment["points"] = [p for k, p in enumerate(points) if k % 3 == 1 or k in (0, len(points) - 1)]
+    uneven = tmp_path / "uneven.json"
+    uneven.write_text(json.dumps(without_unused_points(network)))
+    errors = []
+    for name, options in (("as-is.obj", ()), ("even.obj", ("--resample", 0.015))):
+        done = tracemesh("surface", uneven, "-o", tmp_path / name, *options)
+        assert done.returncode == 0, done.stderr
+        truth = ("--truth", shared_data / "lilium.obj", "--align", "rigid", "--json")
+        errors.append(json.loads(tracemesh("evaluate", tmp_path / name, *truth).stdout)["mean"])
+    assert errors[1] < errors[0]
+
+
+@pytest.mark.parametrize("step", ["0", "-1", "nan", "1e-12"])
+def test_a_step_that_cannot_be_is_refused(lilium: Path, tmp_path: Path, step: str) -> None:
+    done = tracemesh("surface", lilium / "network.json", "-o", tmp_path / "mesh.obj", f"--resample={step}")
+    assert done.returncode == 1
+    assert "tracemesh: " in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("extension", ["obj", "ply", "stl"])

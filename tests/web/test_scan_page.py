@@ -17,7 +17,7 @@ from tracemesh_bridge.framing import Frame, FrameLayout, encode
 SENSORS = ["accelerometer", "gyroscope", "magnetometer"]
 TICKS_PER_FRAME = 8
 TURN = 12.0
-"""s that the phone takes around the circle: slow, so that it hardly matters that it waits while the server is killed."""
+"""s that the phone takes around the circle: slow, for it has to wait a little while the server is killed."""
 
 
 class Hand:

@@ -1,6 +1,7 @@
 """Options that commands share, and the kinds of values that options take."""
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 from platformdirs import user_data_path
 from pydantic import TypeAdapter, ValidationError
 
-from tracemesh.wire.base import Identifier, UnitQuaternion
+from tracemesh.wire.base import Identifier, Name, UnitQuaternion
 from tracemesh.wire.device import Device, Wheel
 from tracemesh_bridge.framing import FrameLayout, read_layout
 from tracemesh_bridge.keys import KEYS_HELP
@@ -37,7 +38,7 @@ def add_recording_command(commands: Commands, name: str, words: str, run: Run) -
     option("--session", type=identifier, help="record into this session (default: a new one)")
     option("--spool", type=Path, help="folder for what is not sent yet (default: one per device)")
     option("--device", type=identifier, default=name, help="identity of the device (default: %(default)s)")
-    option("--name", default="", help="name of the device for people")
+    option("--name", type=name_for_people, default="", help="name of the device for people")
     option(
         "--mounting", type=quaternion, default=(1.0, 0.0, 0.0, 0.0), metavar="W,X,Y,Z",
         help="turns the axes (tangent, normal, B) into the device's own axes; the default is the device's usual one",
@@ -86,16 +87,28 @@ def checked(check: Callable[[str], Any], wanted: str) -> Callable[[str], Any]:
     return convert
 
 
-def _number(text: str, zero: bool) -> float:
+def _number(text: str, zero: bool, most: float = sys.float_info.max) -> float:
     value = float(text)
-    if not 0 <= value < float("inf") or (value == 0 and not zero):
+    if not 0 <= value <= most or (value == 0 and not zero):
+        raise ValueError(text)
+    return value
+
+
+def _whole(text: str, least: int, most: float = float("inf")) -> int:
+    value = int(text)
+    if not least <= value <= most:
         raise ValueError(text)
     return value
 
 
 positive = checked(lambda text: _number(text, zero=False), "a number above 0")
 not_negative = checked(lambda text: _number(text, zero=True), "a number from 0 up")
+probability = checked(lambda text: _number(text, zero=True, most=1.0), "a probability from 0 to 1")
+whole = checked(lambda text: _whole(text, 0), "a whole number from 0 up")
+count = checked(lambda text: _whole(text, 1), "a whole number from 1 up")
+port_number = checked(lambda text: _whole(text, 0, 65535), "a port from 0 to 65535")
 identifier = checked(TypeAdapter(Identifier).validate_python, "up to 64 letters, digits, _ and -")
+name_for_people = checked(TypeAdapter(Name).validate_python, "up to 200 characters, none of them a control character")
 quaternion = checked(
     lambda text: TypeAdapter(UnitQuaternion).validate_python(text.split(",")),
     "a rotation: four numbers w,x,y,z separated by commas, of length 1",

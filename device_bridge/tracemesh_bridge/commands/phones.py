@@ -2,7 +2,7 @@
 
 import argparse
 
-from tracemesh_bridge.commands.options import Commands, Run, add_recording_command, device, target
+from tracemesh_bridge.commands.options import Commands, Run, add_recording_command, device, port_number, target
 from tracemesh_bridge.phone import MOUNTING
 from tracemesh_bridge.record import record
 from tracemesh_bridge.sources.phyphox import Phyphox
@@ -16,11 +16,11 @@ def add(commands: Commands) -> None:
     command.add_argument("--address", required=True, help="host:port as the app shows it")
     command.add_argument(
         "--sensors", nargs="+", default=SensorServerSettings.sensors, metavar="SENSOR",
-        help="Android names without android.sensor. (default: %(default)s)",
+        help=f"Android names without android.sensor. (default: {' '.join(SensorServerSettings.sensors)})",
     )  # fmt: skip
     command = _add(commands, "sensorlogger", "record a phone that runs Sensor Logger", _sensorlogger)
     command.add_argument("--host", default="0.0.0.0", help="address to listen at (default: %(default)s, any)")
-    command.add_argument("--port", type=int, default=8200, help="port to listen at (default %(default)d)")
+    command.add_argument("--port", type=port_number, default=8200, help="port to listen at (default %(default)d)")
     command = _add(commands, "phyphox", "record a phone that runs phyphox", _phyphox)
     command.add_argument("--address", required=True, help="as the app shows it, such as http://192.168.0.7:8080")
 

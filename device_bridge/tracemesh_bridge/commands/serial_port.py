@@ -8,6 +8,7 @@ from tracemesh_bridge.commands.options import (
     add_command,
     add_port,
     add_recording_command,
+    count,
     device,
     layout,
     positive,
@@ -29,7 +30,7 @@ def add(commands: Commands) -> None:
     command = add_command(commands, "inspect", "show a frame's raw bytes beside the decoded values", _inspect)
     add_port(command)
     option = command.add_argument
-    option("--count", type=int, default=20, help="frames to show (default %(default)d)")
+    option("--count", type=count, default=20, help="frames to show (default %(default)d)")
     option("--interval", type=positive, default=0.5, help="s between two frames (default %(default)g)")
     command = add_command(commands, "doctor", "tell what is wrong with a device, its port or the server", _doctor)
     add_port(command)

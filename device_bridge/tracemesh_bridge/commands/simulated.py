@@ -3,7 +3,17 @@
 import argparse
 from pathlib import Path
 
-from tracemesh_bridge.commands.options import Commands, add_command, not_negative, positive
+from tracemesh_bridge.commands.options import (
+    Commands,
+    add_command,
+    checked,
+    count,
+    not_negative,
+    port_number,
+    positive,
+    probability,
+    whole,
+)
 from tracemesh_bridge.sources.virtual import FAULTS, VirtualSettings, run_virtual
 
 APPS = ("sensorserver", "sensorlogger", "phyphox")
@@ -20,18 +30,20 @@ def add(commands: Commands) -> None:
         help="the ride goes on by itself, or by one reading per request (default: %(default)s)",
     )  # fmt: skip
     option("--log", type=Path, help="append each whole frame sent to this file, in hex")
-    option("--unplug", type=int, metavar="N", help="vanish after N requests, come back under another name")
+    option("--unplug", type=count, metavar="N", help="vanish after N requests, come back under another name")
     for fault in FAULTS:
-        option(f"--{fault}", type=not_negative, default=0.0, metavar="P", help="probability of this fault")
+        option(f"--{fault}", type=probability, default=0.0, metavar="P", help="probability of this fault")
     command = add_command(commands, "virtual-phone", "be a phone that scans a built-in shape", _virtual_phone)
     _add_ride(command)
     option = command.add_argument
     option("--app", choices=APPS, required=True, help="app that it runs")
-    option("--port", type=int, default=0, help="port to serve at (default: a free one); not for sensorlogger")
-    option("--url", default="http://127.0.0.1:8200", help="where sensorlogger posts to (default: %(default)s)")
+    option("--port", type=port_number, default=0, help="port to serve at (default: a free one); not for sensorlogger")
+    option(
+        "--url", type=_url, default="http://127.0.0.1:8200", help="where sensorlogger posts to (default: %(default)s)"
+    )
     option("--rate", type=positive, default=100.0, help="samples per second of the ride (default %(default)g)")
-    option("--repeat", type=not_negative, default=0.0, metavar="P", help="probability that a post is sent twice")
-    option("--reorder", type=not_negative, default=0.0, metavar="P", help="probability that a post is overtaken")
+    option("--repeat", type=probability, default=0.0, metavar="P", help="probability that a post is sent twice")
+    option("--reorder", type=probability, default=0.0, metavar="P", help="probability that a post is overtaken")
     option("--clock-jump", type=float, default=0.0, metavar="S", help="s by which its clock is set after 10 s")
 
 
@@ -39,7 +51,7 @@ def _add_ride(command: argparse.ArgumentParser) -> None:
     option = command.add_argument
     option("--shape", default="leaf", help="built-in shape that it scans (default: %(default)s)")
     option("--speed", type=positive, default=1.0, help="times faster than life (default %(default)g)")
-    option("--seed", type=int, default=0, help="of everything random (default %(default)d)")
+    option("--seed", type=whole, default=0, help="of everything random (default %(default)d)")
     option("--noise", type=not_negative, default=1.0, help="factor on all imperfections (default %(default)g)")
 
 
@@ -59,3 +71,12 @@ def _virtual_phone(args: argparse.Namespace) -> int:
     faults = (args.repeat, args.reorder, args.clock_jump)
     run_virtual_phone(VirtualPhoneSettings(args.app, args.port, args.url, *ride, *faults))
     return 0
+
+
+def _http(text: str) -> str:
+    if not text.startswith(("http://", "https://")):
+        raise ValueError(text)
+    return text
+
+
+_url = checked(_http, "an address such as http://127.0.0.1:8200")

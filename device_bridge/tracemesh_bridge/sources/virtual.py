@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from tracemesh_bridge.errors import BridgeError
+
 FAULTS = ("short", "garbage", "silent", "late", "surplus", "duplicate")
 LATE_BY = 0.4
 PATIENCE = 1.0
@@ -92,6 +94,8 @@ class _Port:
         self._plug(self._link.with_name(f"{self._link.name}.{self._plugs}") if self._link else None)
 
     def _plug(self, link: Path | None) -> None:
+        if link and link.exists() and not link.is_symlink():
+            raise BridgeError(f"wanted a name for a new link, got {link}, which is there and is no link")
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         self.name = os.ttyname(self._slave)

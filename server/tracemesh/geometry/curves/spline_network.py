@@ -19,6 +19,7 @@ from tracemesh.geometry.network import CurveNetwork, Floats, Ints, Segment
 from tracemesh.geometry.rotations import normalized
 
 _PARTS = 16  # of an interval, between which arc length is interpolated
+_MOST_POINTS = 5e6
 _SAME_WAY = 0.5  # cosine between end and start of a closed curve that goes smoothly through its start
 
 
@@ -150,11 +151,24 @@ class _SplineNetwork:
         return own[index], place - index
 
 
+def _check_step(network: CurveNetwork, step: float) -> None:
+    if not (np.isfinite(step) and step > 0):
+        raise NetworkError(f"wanted a positive number of metres between points, got {step:g}")
+    length = sum(
+        float(np.linalg.norm(np.diff(network.points[s.points], axis=0), axis=1).sum()) for s in network.segments
+    )
+    if length / step > _MOST_POINTS:
+        raise NetworkError(
+            f"a step of {step:.3g} m asks for more than {_MOST_POINTS:.0e} points on {length:.3g} m of curves"
+        )
+
+
 def resample_network(network: CurveNetwork, step: float) -> CurveNetwork:
     """The network on its splines, every segment evenly spaced by about `step` m; ends of segments stay what they are.
 
-    Raises NetworkError where two neighbouring points are one.
+    Raises NetworkError where two neighbouring points are one, and for a step that is no length or asks for too much.
     """
+    _check_step(network, step)
     splines = _SplineNetwork(network)
     kept, index = np.unique([p for s in network.segments for p in (s.points[0], s.points[-1])], return_inverse=True)
     points, normals, segments, count = [network.points[kept]], [network.normals[kept]], [], len(kept)
