@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from tracemesh.errors import InputError, TracemeshError
-from tracemesh.files import read_bytes, read_text, write_all
+from tracemesh.files import check_writable, read_bytes, read_text, write_all
 from tracemesh.terminal import ProgressLine
 from tracemesh.wire.resources import ReconstructionParameters
 
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
+T = TypeVar("T")
+Number = TypeVar("Number", int, float)
 MESH_FORMATS = ("glb", "obj", "ply", "stl")
 
 
@@ -42,11 +46,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (TracemeshError, OSError) as error:
         print(f"tracemesh: {error}", file=sys.stderr)
         status = 1
+    except argparse.ArgumentTypeError as error:
+        parser.error(str(error))
     except ValidationError as error:
-        parser.error("; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()))
+        parser.error("; ".join(map(_in_words, error.errors())))
     except KeyboardInterrupt:
         status = 130
     sys.exit(status)
+
+
+def _in_words(fault: ErrorDetails) -> str:
+    where = ".".join(map(str, fault["loc"]))
+    return f"{where + ': ' if where else ''}{fault['msg'].removeprefix('Value error, ')}"
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -74,7 +85,9 @@ def _add_reconstruct(commands: Commands) -> None:
     _add_mesh_output(parser)
     parser.add_argument("--network", type=Path, metavar="NET.json", help="also write the curve network")
     parser.add_argument("--report", type=Path, metavar="REPORT.json", help="also write times, sizes, quality, warnings")
-    parser.add_argument("--step", default="1.6%", help="distance of points: %% of the diagonal, or m (default 1.6%%)")
+    parser.add_argument(
+        "--step", type=_step, default="1.6%", help="distance of points: %% of the diagonal, or m (default 1.6%%)"
+    )
     parser.add_argument("--stretch", type=float, metavar="L2", help="smoothing length of the stretch term, m (auto)")
     parser.add_argument("--bend", type=float, metavar="L4", help="smoothing length of the bend term, m (auto)")
     parser.add_argument("--weights", choices=("auto", "thesis"), default="auto", help="smoothing (default auto)")
@@ -96,9 +109,7 @@ def _add_reconstruct(commands: Commands) -> None:
     field.add_argument(
         "--still", metavar="STILL.ndjson", help="the field that a recording of the device at rest measured"
     )
-    parser.add_argument(
-        "--date", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of the scan, with --place (default today)"
-    )
+    parser.add_argument("--date", type=_date, metavar="YYYY-MM-DD", help="of the scan, with --place (default today)")
     parser.add_argument("--infer-nodes", action="store_true", help="find the nodes that are not marked")
     parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
     parser.add_argument("--no-surface", action="store_true", help="stop after the network; MESH is then not written")
@@ -164,11 +175,11 @@ def _add_simulate(commands: Commands) -> None:
     parser.add_argument("--recording", type=Path, metavar="SCAN.ndjson", help="also write what the device sends")
     parser.add_argument(
         "--noise",
-        type=float,
+        type=_noise,
         default=0.015,
         help="of a unit vector, per axis; outliers, headings and marks go with it (default 0.015; 0: an exact device)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the noise (default 0)")
+    parser.add_argument("--seed", type=_seed, default=0, help="of the noise (default 0)")
     parser.set_defaults(command=_simulate)
 
 
@@ -179,7 +190,7 @@ def _add_serve(commands: Commands) -> None:
         description="Serve sessions, live view, reconstruction jobs and the web page. Settings: docs/settings.md.",
     )
     parser.add_argument("--host", help="address to listen on (default 127.0.0.1; any other demands a token)")
-    parser.add_argument("--port", type=int, help="port to listen on (default 8000)")
+    parser.add_argument("--port", type=_port, help="port to listen on (default 8000)")
     parser.add_argument("--data-dir", type=Path, metavar="DIR", help="where sessions and meshes are kept")
     parser.set_defaults(command=_serve)
 
@@ -193,7 +204,7 @@ def _add_demo(commands: Commands) -> None:
     )
     parser.add_argument("--headless", action="store_true", help="no browser: do the same work, write files, exit")
     parser.add_argument("--out", type=Path, metavar="DIR", help="with --headless: network.json, mesh.glb, report.json")
-    parser.add_argument("--port", type=int, default=8000, help="port of the server (default 8000; 0: a free one)")
+    parser.add_argument("--port", type=_port, default=8000, help="port of the server (default 8000; 0: a free one)")
     parser.set_defaults(command=_demo)
 
 
@@ -205,17 +216,44 @@ def _mesh_path(text: str) -> Path:
     return path
 
 
-def _place(text: str) -> tuple[float, float]:
-    latitude, _, longitude = text.partition(",")
+def _checked(check: Callable[[str], T], wanted: str) -> Callable[[str], T]:
+    """A type for argparse that says what was wanted when `check` raises ValueError."""
+
+    def convert(text: str) -> T:
+        try:
+            return check(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"wanted {wanted}, got {text!r}") from None
+
+    return convert
+
+
+def _two_numbers(text: str) -> tuple[float, float]:
+    latitude, longitude = text.split(",")
     return float(latitude), float(longitude)
 
 
-def _length(text: str) -> tuple[tuple[int, int], float]:
-    segment, _, metres = text.partition("=")
-    curve, _, place = segment.partition(":")
-    if min(int(curve), int(place)) < 1:
-        raise argparse.ArgumentTypeError(f"curves and segments are counted from 1, got {text!r}")
-    return (int(curve) - 1, int(place) - 1), float(metres)
+def _measured_length(text: str) -> tuple[tuple[int, int], float]:
+    segment, metres = text.split("=")
+    curve, place = segment.split(":")
+    return (_between(int(curve), 1) - 1, _between(int(place), 1) - 1), float(metres)
+
+
+def _between(number: Number, least: float, most: float = math.inf) -> Number:
+    if not least <= number <= most:
+        raise ValueError(number)
+    return number
+
+
+_step = _checked(
+    lambda text: ReconstructionParameters(step=text).step, "a percentage such as 1.6% or metres such as 0.01"
+)
+_place = _checked(_two_numbers, "latitude and longitude in degrees, such as 45.2,5.7")
+_length = _checked(_measured_length, "CURVE:SEGMENT=METRES, both counted from 1, such as 1:2=0.35")
+_date = _checked(date.fromisoformat, "a date such as 2026-11-22")
+_noise = _checked(lambda text: _between(float(text), 0.0, 1.0), "a number from 0 to 1")
+_seed = _checked(lambda text: _between(int(text), 0), "a whole number from 0 up")
+_port = _checked(lambda text: _between(int(text), 0, 65535), "a port from 0 to 65535")
 
 
 def _reconstruct(chosen: argparse.Namespace) -> int:
@@ -232,6 +270,7 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
         soft=chosen.soft,
         surface=not chosen.no_surface,
     )
+    check_writable(chosen.output, chosen.network, chosen.report)
     scan = read_scan(read_text(chosen.input), chosen.input, _field(chosen))
     with ProgressLine() as progress:
         result = reconstruct(scan, parameters, progress, dict(chosen.length))
@@ -273,6 +312,7 @@ def _surface(chosen: argparse.Namespace) -> int:
     from tracemesh.formats.networks import read_network
     from tracemesh.pipeline import span
 
+    check_writable(chosen.output, chosen.report)
     network = read_network(read_text(chosen.input), chosen.input)
     with ProgressLine() as progress:
         result = span(network, progress, chosen.resample)
@@ -316,6 +356,7 @@ def _simulate(chosen: argparse.Namespace) -> int:
     from tracemesh.geometry.simulated.shapes import SHAPES
     from tracemesh.geometry.simulated.simulation import Imperfections, plan_scan, simulate_scan
 
+    check_writable(chosen.output, chosen.truth, chosen.recording)
     shape = SHAPES[chosen.shape]()
     imperfections = Imperfections().scaled(chosen.noise / Imperfections.vector)
     simulated = simulate_scan(plan_scan(shape, imperfections=imperfections, seed=chosen.seed), chosen.seed)
@@ -341,6 +382,8 @@ def _serve(chosen: argparse.Namespace) -> int:
 def _demo(chosen: argparse.Namespace) -> int:
     from tracemesh.demo import headless, watch
 
+    if chosen.headless != (chosen.out is not None):
+        raise argparse.ArgumentTypeError("--headless and --out DIR need each other")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the demo's own processes end with it
     if chosen.headless:
         return headless(chosen.out, chosen.port)

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from tracemesh.errors import InputError
@@ -27,7 +28,7 @@ def read_text(name: str) -> str:
 
 
 def write_all(outputs: Mapping[Path, bytes]) -> None:
-    """Write all files or none; raises OSError with the name that could not be written."""
+    """Write all files or none; raises InputError with the name that could not be written."""
     staged: list[tuple[Path, Path]] = []
     try:
         for path, content in outputs.items():
@@ -37,10 +38,23 @@ def write_all(outputs: Mapping[Path, bytes]) -> None:
         for part, path in staged:
             if part != path:
                 part.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     finally:
         for part, path in staged:
             if part != path:
-                part.unlink(missing_ok=True)
+                with suppress(OSError):
+                    part.unlink(missing_ok=True)
+
+
+def check_writable(*wanted: Path | None) -> None:
+    """Find out before the work what could not be written after it; raises InputError. None stands for no file."""
+    paths = [path for path in wanted if path is not None and not _is_device(path)]
+    for i, path in enumerate(paths):
+        if path in paths[:i]:
+            raise InputError(f"{path}: wanted a file of its own for each result, got this one twice")
+        if not path.parent.is_dir():
+            raise InputError(f"{path}: cannot be written: there is no folder {path.parent}")
 
 
 def _is_device(path: Path) -> bool:

@@ -20,7 +20,7 @@ DRAIN = 5
 def serve(settings: Settings) -> None:
     """Serve until a signal ends it; what was accepted is committed before it returns.
 
-    Raises ResourceError when the data folder or the database cannot be used.
+    Raises ResourceError when the data folder, the database or the address cannot be used.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
@@ -37,7 +37,10 @@ def serve(settings: Settings) -> None:
         log_config=None,
         server_header=False,
     )
-    uvicorn.Server(configuration).run()
+    try:
+        uvicorn.Server(configuration).run()
+    except SystemExit:  # uvicorn's word for an address that it could not have; its log says why
+        raise ResourceError(f"cannot listen at {settings.host}:{settings.port}") from None
 
 
 def _prepare(settings: Settings) -> None:

@@ -215,6 +215,8 @@ def _step(parameters: NetworkParameters, curves: Sequence[PlacedCurve], measured
     length = sum(curve.length for curve in curves)
     step = parameters.step_fraction * max(measured.diagonal, _FLATTEST * length)
     step = step if parameters.step is None else parameters.step
+    if step > length:
+        raise ScanError(f"a step of {step:.3g} m is longer than all curves together, {length:.3g} m")
     if length / step > _MOST_SAMPLES:
         raise ScanError(
             f"a step of {step:.3g} m would cut the curves, {length:.3g} m long, into more than {_MOST_SAMPLES} samples"
