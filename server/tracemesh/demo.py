@@ -141,7 +141,9 @@ def _await_health(process: "subprocess.Popen[str]", address: str) -> None:
     give_up = time.monotonic() + PATIENCE
     while time.monotonic() < give_up:
         if process.poll() is not None:
-            raise TracemeshError(f"the server stopped with status {process.returncode}; is {address} taken?")
+            raise TracemeshError(
+                f"the server stopped with status {process.returncode}; is {address} taken? --port 0 takes a free one"
+            )
         try:
             urllib.request.urlopen(f"http://{address}/healthz", timeout=1).close()
         except OSError:
@@ -165,14 +167,23 @@ def _bridge(*arguments: object) -> list[str]:
 def _process(
     command: Sequence[str], stdin: IO[str] | None = None, stdout: int | None = None
 ) -> Iterator["subprocess.Popen[str]"]:
-    """A process that is gone when the block is left."""
-    process = subprocess.Popen(command, stdin=stdin, stdout=stdout, text=True)
-    try:
-        yield process
-    finally:
-        process.terminate()
+    """A process that is gone when the block is left; what it said is shown only if something went wrong."""
+    with tempfile.TemporaryFile("w+") as said:
+        process = subprocess.Popen(command, stdin=stdin, stdout=stdout, stderr=said, text=True)
         try:
-            process.wait(timeout=10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            yield process
+        except TracemeshError:
+            said.seek(0)
+            sys.stderr.write(said.read())
+            raise
+        finally:
+            _end(process)
+
+
+def _end(process: "subprocess.Popen[str]") -> None:
+    process.terminate()
+    try:
+        process.wait(timeout=10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
