@@ -124,6 +124,27 @@ def test_a_job_leaves_its_files_and_tells_how_far_it_is(
 
 
 @on_sqlite
+def test_a_job_runs_in_the_worker_that_was_prepared_for_it(start: Start, database: Database) -> None:
+    runner = start()
+    assert workers() == []
+    runner.prepare()
+    prepared = workers()
+    assert len(prepared) == 1
+    job = queue(database)
+    runner.submit(job)
+    assert wait(database, job).state == "done"
+    assert workers() == prepared
+
+
+@on_sqlite
+def test_a_closed_runner_starts_no_worker(start: Start) -> None:
+    runner = start()
+    runner.close()
+    runner.prepare()
+    assert workers() == []
+
+
+@on_sqlite
 def test_what_cannot_be_reconstructed_says_why(start: Start, database: Database) -> None:
     job = queue(database, "empty")
     start().submit(job)

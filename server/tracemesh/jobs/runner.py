@@ -6,10 +6,11 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 
 from tracemesh.errors import NotFound
 from tracemesh.jobs.slot import Slot
-from tracemesh.jobs.work import work
+from tracemesh.jobs.work import load_kernel, work
 from tracemesh.settings import Settings
 from tracemesh.storage.database import Database
 from tracemesh.storage.reconstructions import claim, finish, get_reconstruction, requeue, requeue_unfinished
@@ -41,6 +42,12 @@ class JobRunner:
     def submit(self, identifier: str) -> None:
         """Run a queued reconstruction as soon as a slot is free."""
         self._waiting.put(identifier)
+
+    def prepare(self) -> None:
+        """Start the workers and let them load the kernel: whoever scans will want a reconstruction."""
+        for slot in self._slots:
+            with suppress(BrokenProcessPool):  # closing, or lost: the next job finds out
+                slot.submit(load_kernel)
 
     def close(self) -> None:
         """Stop at once; running jobs are taken up again at the next start."""

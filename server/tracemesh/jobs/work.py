@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from tracemesh.pipeline import Reconstruction
 
 
+def load_kernel() -> None:
+    """Take the time that it takes to import the kernel."""
+    import tracemesh.pipeline  # noqa: F401 - work finds it loaded
+
+
 def work(database_url: str, artifact_dir: Path, identifier: str, attempt: int) -> None:
     """Run an attempt to its end, whatever that is; the row tells."""
     database = Database(database_url)

@@ -70,6 +70,7 @@ class _Connection:
             Welcome(version=PROTOCOL_VERSION, session=self._state.session.id, next_seq=self._state.next_seq)
         )
         log.info("recording %s: %s is here, at message %d", hello.recording, hello.device.kind, self._state.next_seq)
+        await asyncio.to_thread(self._services.runner.prepare)
         await first_to_end(self._read(self._state), self._answer())
 
     async def refuse(self, reason: Refused) -> None:
