@@ -206,6 +206,7 @@ def test_contradictions_name_the_curve(messages: list[Recorded], error: type[Exc
 LINES = write_recording(recording(*curve(quaternions(3)), wheel=WHEEL)).splitlines()
 FILE_FAULTS = {
     "nothing": ([], "got nothing"),
+    "another JSON": (['{"format": "tracemesh-network"}'], "line 1: wanted a message of a recording"),
     "no hello": (LINES[1:], "line 1: wanted hello first, got curve.start"),
     "two hellos": ([LINES[0], LINES[0]], "line 2: wanted one hello"),
     "gap": ([LINES[0], LINES[1], "", LINES[3]], "line 4: wanted the message with seq 1, got 2"),

@@ -94,8 +94,10 @@ def _bad_indices(name: str, indices: list[int], count: int) -> Iterator[str]:
 
 def _told(error: ValidationError) -> str:
     first = error.errors()[0]
+    if first["type"] == "json_invalid":
+        return f"wanted a curve network in JSON: {first['msg']}"
     where = ".".join(str(part) for part in first["loc"])
-    came = "" if first["type"] in ("missing", "json_invalid") else f", got {str(first['input'])[:60]!r}"
+    came = "" if first["type"] == "missing" else f", got {str(first['input'])[:60]!r}"
     return f"{where + ': ' if where else ''}{first['msg']}{came}"
 
 

@@ -150,6 +150,8 @@ def _message(line: str, where: str) -> Hello | Recorded:
         return from_device.validate_json(line)
     except ValidationError as error:
         first = error.errors()[0]
+        if first["type"] == "union_tag_not_found":
+            raise InputError(f'{where}: wanted a message of a recording, such as {{"type": "hello", ...}}') from None
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"{where}: {place + ': ' if place else ''}{first['msg']}") from None
 
