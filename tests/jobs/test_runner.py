@@ -137,6 +137,19 @@ def test_a_job_runs_in_the_worker_that_was_prepared_for_it(start: Start, databas
 
 
 @on_sqlite
+def test_an_interrupt_at_the_terminal_leaves_workers_to_the_server(start: Start, database: Database) -> None:
+    runner = start()
+    for _ in range(2):
+        job = queue(database)
+        runner.submit(job)
+        assert wait(database, job).state == "done"
+        before = workers()
+        os.kill(before[0], signal.SIGINT)
+        time.sleep(0.2)
+        assert workers() == before
+
+
+@on_sqlite
 def test_a_closed_runner_starts_no_worker(start: Start) -> None:
     runner = start()
     runner.close()

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -56,7 +57,8 @@ class Slot:
 
 
 def _end_with_parent() -> None:
-    """A server killed with -9 cannot end its workers; they watch it instead."""
+    """A server killed with -9 cannot end its workers; they watch it instead. A Ctrl-C is for the server alone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
 
     def watch() -> None:
