@@ -20,7 +20,7 @@ from tracemesh.geometry.comparison.evaluation import evaluate
 from tracemesh.geometry.curves.energy import Weights
 from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkReconstruction, reconstruct_network
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.rotations import exp
+from tracemesh.geometry.rotations import darboux_frames, exp
 from tracemesh.geometry.scan import CurveScan, Scan
 from tracemesh.geometry.simulated.shapes import SHAPES
 from tracemesh.geometry.simulated.simulation import exact_scan
@@ -279,6 +279,23 @@ def test_the_report_is_json_and_says_what_was_done(faulty_scan: Callable) -> Non
     assert report["curve_bias"]["on"]
     assert report["frame_noise_deg"] == pytest.approx(np.degrees(0.02), rel=0.1)
     assert set(report["seconds"]) >= {"cleaning", "weighing", "closing", "smoothing", "positions"}
+
+
+def test_robust_loss_bears_scans_of_which_much_is_chance() -> None:
+    scan, random = exact(), np.random.default_rng(3)
+    curves = []
+    for c in scan.curves:
+        count = len(c.distance)
+        spoiled = random.random(count) < 0.08
+        size = np.where(spoiled[:, None], np.pi, np.radians(1.4))
+        frames = darboux_frames(c.tangent, c.normal) @ exp(size * random.uniform(-1, 1, (count, 3)))
+        curves.append(replace(c, tangent=frames[:, :, 0], normal=frames[:, :, 1]))
+    truth = reconstruct_network(scan, NetworkParameters(step=0.02)).network
+    errors = []
+    for robust in (False, True):
+        network = reconstruct_network(Scan(tuple(curves)), NetworkParameters(step=0.02, robust=robust)).network
+        errors.append(np.sqrt(np.mean((network.normals - truth.normals) ** 2)))
+    assert errors[1] < errors[0] / 2
 
 
 def test_thesis_weights_are_lambda_and_mu_of_one() -> None:

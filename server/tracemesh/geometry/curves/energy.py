@@ -67,10 +67,16 @@ class EnergyPoint:
     """The energy at frames (u, 3, 3) for data frames (u, 3, 3): value at once, derivatives when asked for."""
 
     def __init__(
-        self, stencil: Stencil, frames: Floats, data: Floats, weights: Weights, softening: float = 1.0
+        self,
+        stencil: Stencil,
+        frames: Floats,
+        data: Floats,
+        weights: Weights,
+        softening: float = 1.0,
+        trust: Floats | float = 1.0,
     ) -> None:
-        """Find the value; softening: factor on the stiffness of the nodes."""
-        self.frames = frames
+        """Find the value; softening: factor on the stiffness of the nodes. trust: (u,) factors on the data's weight."""
+        self.frames, self._data = frames, trust * stencil.data
         self._stiffness = softening * stencil.stiffness
         self._s, self._stretch, self._bend = stencil, weights.stretch**2, weights.bend**4
         s, n = stencil, frames[:, :, 1]
@@ -81,7 +87,7 @@ class EnergyPoint:
         self._bend_weight = self._bend * 8 / (s.h_in + s.h_out)
         self._split = n[s.pair[:, 0]] - n[s.pair[:, 1]]
         self.value = float(
-            2 * np.sum(s.data * (3 - _trace(self._fit)))
+            2 * np.sum(self._data * (3 - _trace(self._fit)))
             + 2 * self._stretch * np.sum((3 - _trace(self._turn)) / s.h)
             + 0.5 * np.sum(self._bend_weight * np.sum(self._bends**2, axis=1))
             + self._stiffness * np.sum(self._split**2)
@@ -90,7 +96,7 @@ class EnergyPoint:
     def gradient(self) -> Floats:
         """Derivative (u, 3) with respect to w in X exp(w)."""
         s = self._s
-        gradient: Floats = 2 * s.data[:, None] * skew_vector(self._fit)
+        gradient: Floats = 2 * self._data[:, None] * skew_vector(self._fit)
         force = (2 * self._stretch / s.h)[:, None] * self._rate
         gradient[s.right] += force
         gradient[s.left] -= force
@@ -114,7 +120,7 @@ class EnergyPoint:
         """Blocks (k, 3, 3) of the Hessian at the places of `pattern_of`."""
         s = self._s
         curl = _curl(self._fit)
-        diagonal = s.data[:, None, None] * (curl + _transposed(curl))
+        diagonal = self._data[:, None, None] * (curl + _transposed(curl))
         curl = _curl(self._turn)
         across = (-2 * self._stretch / s.h)[:, None, None] * _transposed(curl)
         if self._stretch:

@@ -43,6 +43,7 @@ class NetworkParameters:
     lengths, m; None: automatic, or 0 if only the other is given. weights: automatic ones by cross-validation, or the
     thesis's lambda = mu = 1 in metres. curve_bias: estimate a rotation and a scale per curve and how far its nodes are
     from their marks: where the data speak for it, always, or never.
+    robust: Huber's loss in the regression, for scans with more outliers than cleaning can tell from the rest.
     """
 
     step: float | None = None
@@ -51,6 +52,7 @@ class NetworkParameters:
     bend: float | None = None
     weights: Literal["auto", "thesis"] = "auto"
     curve_bias: Literal["auto", "on", "off"] = "auto"
+    robust: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ class NetworkReconstruction:
         layout = self._samples.layout
         used = weights or _weights(self._parameters, self._choice.weights)
         self._stages.begin("smoothing")
-        regression = self._solver.solve(self._samples.frames, used, self._start)
+        regression = self._solver.solve(self._samples.frames, used, self._start, self._parameters.robust)
         self._stages.begin("positions")
         positions = self._positions(layout, regression.frames)
         self._stages.begin("uncertainty")

@@ -25,6 +25,16 @@ _SLOW = 0.1  # a kept factorisation is renewed when steps shrink less than this
 _TRIALS = 100
 _DAMPING = 1e-3  # of the Hessian's diagonal, once a step failed
 _ROUNDING = 1e-12  # relative; energies that differ less are the same
+_FAR = 2.0  # deviations of the data frames from the smooth ones
+_MEDIAN = 1.538  # median length of a vector of three independent normal deviates
+_ROUNDS, _SETTLED = 20, 1e-3  # of reweighting: the most of them, and the change of trust that ends them
+
+
+def _trust(data: Floats, frames: Floats) -> Floats:
+    """Factors (u,) on the weights of data frames that make their squared distances Huber's loss."""
+    distance = np.linalg.norm(data - frames, axis=(1, 2)) / np.sqrt(2)  # the angle, rad, while small
+    far = _FAR * np.median(distance) / _MEDIAN
+    return np.asarray(np.minimum(1.0, far / np.maximum(distance, np.finfo(float).tiny)))
 
 
 @dataclass(frozen=True)
@@ -45,21 +55,37 @@ class RegressionSolver:
         self._pattern = pattern_of(self._stencil)
         self._factors: qdldl.Solver | None = None
         self._last: Floats | None = None
+        self._trust: Floats | float = 1.0
 
-    def solve(self, frames: Floats, weights: Weights, start: Floats | None = None) -> Regression:
+    def solve(self, frames: Floats, weights: Weights, start: Floats | None = None, robust: bool = False) -> Regression:
         """Minimiser for data frames (n, 3, 3) at the layout's rows.
 
-        Started from the solution before, at first from `start` (n, 3, 3) or the data.
+        Started from the solution before, at first from `start` (n, 3, 3) or the data. robust: data frames far off count
+        by their distance, not its square (Huber's loss); how far is far is estimated from all distances.
         """
-        data = frames[self._stencil.representative]
+        data, self._trust = frames[self._stencil.representative], 1.0
         if self._last is None:
             self._last = (frames if start is None else start)[self._stencil.representative]
-        soft = EnergyPoint(self._stencil, self._last, data, weights, _SOFTENING)
+        found, tried = self._minimise(data, weights)
+        for _ in range(_ROUNDS if robust else 0):
+            before, self._trust = self._trust, _trust(data, found.frames)
+            if np.abs(self._trust - before).max() < _SETTLED:
+                break
+            found, more = self._minimise(data, weights)
+            tried += more
+        return Regression(found.frames[self._stencil.row], found.value, tried)
+
+    def _minimise(self, data: Floats, weights: Weights) -> tuple[EnergyPoint, int]:
+        """Minimum for the trust put in every data frame, and how many steps were tried."""
+        assert self._last is not None
+        soft = self._point(self._last, data, weights, _SOFTENING)
         near, first = self._descend(soft, data, weights, _SOFTENING, _NEAR)
-        stiff = EnergyPoint(self._stencil, near.frames, data, weights)
-        found, second = self._descend(stiff, data, weights, 1.0, _STEP)
+        found, second = self._descend(self._point(near.frames, data, weights, 1.0), data, weights, 1.0, _STEP)
         self._last = found.frames
-        return Regression(found.frames[self._stencil.row], found.value, first + second)
+        return found, first + second
+
+    def _point(self, frames: Floats, data: Floats, weights: Weights, softening: float) -> EnergyPoint:
+        return EnergyPoint(self._stencil, frames, data, weights, softening, self._trust)
 
     def _descend(
         self, point: EnergyPoint, data: Floats, weights: Weights, softening: float, least: float
@@ -70,7 +96,7 @@ class RegressionSolver:
             if renew:
                 self._factorise(point, damping)
             step = -self._solved(point.gradient().ravel()).reshape(-1, 3)
-            moved = EnergyPoint(self._stencil, point.frames @ exp(step), data, weights, softening)
+            moved = self._point(point.frames @ exp(step), data, weights, softening)
             before, size = size, float(np.abs(step).max())
             if moved.value <= point.value + _ROUNDING * abs(point.value):
                 point, damping = moved, damping / 10 if damping > _DAMPING else 0.0
