@@ -77,7 +77,7 @@ def read_archive(file: IO[bytes], max_bytes: int) -> tuple[Manifest, dict[str, b
                 raise InputError(f"wanted an archive of at most {max_bytes} bytes when unpacked")
             manifest = Manifest.model_validate_json(archive.read(MANIFEST))
             contents = {name: archive.read(name) for name in manifest.files}
-    except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError) as error:
+    except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError) as error:  # as zipfile raises them
         raise InputError(f"wanted an archive of a session: {error}") from None
     except ValidationError as error:
         first = error.errors()[0]
