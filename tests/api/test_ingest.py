@@ -3,9 +3,12 @@
 import json
 import random
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any
 
 import pytest
+from websockets.exceptions import ConnectionClosed
 
 Ride = Callable[..., Any]
 Line = Callable[..., list[dict[str, Any]]]
@@ -161,9 +164,14 @@ def test_marks_and_curves_are_taken_back(server: Any, ride: Ride, line: Line) ->
 def test_a_deleted_session_cuts_its_devices_off(server: Any, ride: Ride, line: Line) -> None:
     session = server.new_session()
     rider = ride("cut", session)
-    for message in line(20):
-        rider.send(message)
-    assert server.http.delete(f"/sessions/{session}").status_code == 204
+    with ThreadPoolExecutor(1) as background:
+        deleted = background.submit(server.http.delete, f"/sessions/{session}")
+        for message in line(2000, block=1):
+            with suppress(
+                ConnectionClosed
+            ):  # it goes on sending: what comes after the deletion must not hide the reason
+                rider.send(message)
+        assert deleted.result().status_code == 204
     while (answer := rider.receive())["type"] == "ack":
         pass
     assert answer["code"] == "unknown"

@@ -83,7 +83,9 @@ async def store_upload(recorder: Recorder, upload: Upload) -> None:
             if count % CHUNK == 0:
                 await recorder.flush()
         await recorder.flush()
-        if sender.failure is not None:
-            raise sender.failure
+    except Refused as error:
+        raise sender.failure or error from None
     finally:
         await recorder.leave(state, sender)
+    if sender.failure is not None:
+        raise sender.failure

@@ -29,7 +29,7 @@ async def ingest(socket: WebSocket, services: UseServices) -> None:
     try:
         await device.serve()
     except Refused as reason:
-        await device.refuse(reason)
+        await device.refuse(device.failure or reason)
     except (WebSocketDisconnect, TimeoutError):
         pass
     finally:
@@ -44,7 +44,8 @@ class _Connection:
         self._services = services
         self._state: RecordingState | None = None
         self._acknowledged: int | None = None
-        self._failure: Refused | None = None
+        self.failure: Refused | None = None
+        """Why the recorder gave this connection up; what is read after that fails for no reason of its own."""
         self._wake = asyncio.Event()
 
     def acknowledge(self, seq: int) -> None:
@@ -52,7 +53,7 @@ class _Connection:
         self._wake.set()
 
     def fail(self, reason: Refused) -> None:
-        self._failure = reason
+        self.failure = reason
         self._wake.set()
 
     async def serve(self) -> None:
@@ -102,13 +103,13 @@ class _Connection:
                 await recorder.flush()
 
     async def _answer(self) -> None:
-        while self._failure is None:
+        while self.failure is None:
             await self._wake.wait()
             self._wake.clear()
             if self._acknowledged is not None:
                 seq, self._acknowledged = self._acknowledged, None
                 await self._send(Ack(seq=seq))
-        raise self._failure
+        raise self.failure
 
     async def _receive(self) -> bytes:
         message = await self._socket.receive()
