@@ -4,12 +4,16 @@ import os
 import shutil
 import socket
 import subprocess
+import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from uuid import uuid4
 
+import httpx
 import pytest
 from sqlalchemy import create_engine
 
@@ -83,3 +87,46 @@ def new_database(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 def database_url(request: pytest.FixtureRequest, new_database: Callable[[str], str]) -> str:
     """URL of an empty database, once of each kind."""
     return new_database(request.param)
+
+
+@dataclass(frozen=True)
+class S3Server:
+    """A real S3-compatible server with one bucket: its URL, and what takes it away and brings it back, empty."""
+
+    bucket: str
+    stop: Callable[[], None]
+    start: Callable[[], None]
+
+
+@pytest.fixture
+def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[S3Server]:
+    """Programs that are started meanwhile find it by the usual variables, too."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    endpoint, running = f"http://127.0.0.1:{port}", []
+    for name, value in (
+        ("ENDPOINT_URL", endpoint),
+        ("ACCESS_KEY_ID", "k"),
+        ("SECRET_ACCESS_KEY", "s"),
+        ("REGION", "x"),
+    ):
+        monkeypatch.setenv(f"AWS_{name}", value)
+
+    def start() -> None:
+        command = [Path(sys.executable).parent / "moto_server", "-H", "127.0.0.1", "-p", str(port)]
+        running.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        while True:
+            with suppress(httpx.TransportError):
+                httpx.put(f"{endpoint}/bucket").raise_for_status()
+                return
+            assert running[-1].poll() is None, "the S3 server did not start"
+            time.sleep(0.05)
+
+    def stop() -> None:
+        running[-1].kill()
+        running[-1].wait()
+
+    start()
+    yield S3Server("s3://bucket/some/prefix", stop, start)
+    stop()

@@ -10,6 +10,7 @@ TracemeshError
 └── ResourceError         what a request to the service names or asks for cannot be had
     ├── NotFound
     ├── Conflict
+    ├── Unavailable       another service that is needed does not answer: asking again later may help
     └── Refused           a device's message that is not taken: carries the code that the protocol has for it
 """
 
@@ -52,6 +53,10 @@ class NotFound(ResourceError):  # noqa: N818 - HTTP's own words
 
 class Conflict(ResourceError):  # noqa: N818 - HTTP's own words
     """The state of the resource does not allow it."""
+
+
+class Unavailable(ResourceError):  # noqa: N818 - HTTP's own words
+    """Another service that is needed does not answer, or answers wrongly; the message says which."""
 
 
 class Refused(ResourceError):  # noqa: N818 - the protocol's own word

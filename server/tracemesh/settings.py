@@ -1,5 +1,6 @@
 """Settings of the service: one frozen object, read from `TRACEMESH_...` variables; listed in docs/settings.md."""
 
+import re
 from pathlib import Path
 from typing import Self
 
@@ -27,6 +28,9 @@ class Settings(BaseSettings):
         default="",
         description="postgresql://user:password@host/name; empty: SQLite in the data folder",
     )
+    artifact_bucket: str = Field(
+        default="", description="s3://bucket/prefix for meshes and reports; empty: a folder in the data folder"
+    )
     token: SecretStr | None = Field(
         default=None, description=f"secret that every request must bring, {MIN_TOKEN} characters or more"
     )
@@ -49,6 +53,13 @@ class Settings(BaseSettings):
             raise ValueError(f"wanted postgresql://USER:PASSWORD@HOST/NAME or nothing, got {url.partition(':')[0]}:...")
         return url
 
+    @field_validator("artifact_bucket")
+    @classmethod
+    def _known_bucket(cls, url: str) -> str:
+        if url and not re.fullmatch(r"s3://[^/]+(/.*)?", url):
+            raise ValueError(f"wanted s3://BUCKET, s3://BUCKET/PREFIX or nothing, got {url}")
+        return url
+
     @model_validator(mode="after")
     def _closed_off_loopback(self) -> Self:
         if self.host not in LOOPBACK and self.token is None:
@@ -68,5 +79,5 @@ class Settings(BaseSettings):
 
     @property
     def artifact_dir(self) -> Path:
-        """Folder of the content-addressed artifacts."""
+        """Folder of the content-addressed artifacts or, with a bucket, of what was used of them lately."""
         return self.data_dir / "artifacts"

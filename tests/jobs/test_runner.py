@@ -16,7 +16,7 @@ from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import recording_from_scan
 from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
-from tracemesh.storage.artifacts import ArtifactStore, artifact_row
+from tracemesh.storage.artifacts import artifact_row, open_artifacts
 from tracemesh.storage.database import Database
 from tracemesh.storage.ingest import Group, commit, open_recording
 from tracemesh.storage.models import ReconstructionRow
@@ -110,7 +110,7 @@ def test_a_job_leaves_its_files_and_tells_how_far_it_is(
     start().submit(job)
     done = wait(database, job)
     assert (done.state, done.error, done.fraction) == ("done", None, 1.0)
-    store = ArtifactStore(settings.artifact_dir)
+    store = open_artifacts(settings)
     with database.read() as transaction:
         files = {n: store.path(artifact_row(transaction, job, n).sha256).read_bytes() for n in done.artifacts}
     vertices, faces = read_mesh(files["mesh.glb"], "glb")

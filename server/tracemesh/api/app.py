@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 
@@ -20,15 +21,18 @@ from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
 from tracemesh.api.routes import archives, curves, ingest, live, pages, proposals, reconstructions, recordings, sessions
 from tracemesh.api.services import Services
+from tracemesh.errors import Unavailable
 from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
-from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.storage.artifacts import ArtifactStore, open_artifacts
 from tracemesh.storage.database import Database
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.device import Recorded
 from tracemesh.wire.resources import Problem, Reconstruction
 
 log = logging.getLogger(__name__)
+TIDY_INTERVAL = 3600.0
+"""s between two searches for artifacts that nobody needs."""
 PROBLEMS: dict[int | str, dict[str, Any]] = {status: {"model": Problem} for status in (401, 403, 404, 409, 422)}
 
 
@@ -86,11 +90,12 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     metrics.watch("watchers", "Browsers that watch a session", lambda: hub.watcher_count)
     previewer = Previewer(database, recorder.flush)
     runner = JobRunner(settings, database, tell)
-    store = ArtifactStore(settings.artifact_dir)
-    await asyncio.to_thread(_collect_garbage, database, store)
+    store = open_artifacts(settings)
+    tidying = asyncio.create_task(_collect_garbage(database, store))
     try:
         yield Services(settings, database, store, recorder, hub, previewer, metrics, runner, loop)
     finally:
+        tidying.cancel()
         await asyncio.to_thread(runner.close)
         await hub.close()
         await previewer.close()
@@ -98,8 +103,17 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
         database.close()
 
 
-def _collect_garbage(database: Database, store: ArtifactStore) -> None:
-    with database.read() as transaction:
-        removed = store.remove_unreferenced(transaction)
-    if removed:
-        log.info("removed %d artifacts that no reconstruction has any more", removed)
+async def _collect_garbage(database: Database, store: ArtifactStore) -> None:
+    """Now and then for ever; what is away is only tidied later."""
+
+    def collect() -> int:
+        with database.read() as transaction:
+            return store.remove_unreferenced(transaction)
+
+    while True:
+        try:
+            if removed := await asyncio.to_thread(collect):
+                log.info("removed %d artifacts that no reconstruction has any more", removed)
+        except (OSError, SQLAlchemyError, Unavailable) as error:
+            log.warning("artifacts could not be tidied: %s", error)
+        await asyncio.sleep(TIDY_INTERVAL)

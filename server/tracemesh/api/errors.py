@@ -10,11 +10,11 @@ from pydantic import ValidationError
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
-from tracemesh.errors import Conflict, NotFound, TracemeshError
+from tracemesh.errors import Conflict, NotFound, TracemeshError, Unavailable
 from tracemesh.wire.resources import Problem
 
 log = logging.getLogger(__name__)
-STATUS = {NotFound: 404, Conflict: 409}
+STATUS = {NotFound: 404, Conflict: 409, Unavailable: 503}
 """Everything else that tracemesh raises on purpose says that the request's content cannot be used: 422."""
 
 

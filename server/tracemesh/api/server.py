@@ -8,7 +8,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from tracemesh.api.app import create_app
 from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
-from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.storage.artifacts import open_artifacts
 from tracemesh.storage.database import Database
 
 MAX_MESSAGE = 4 * 2**20
@@ -46,7 +46,7 @@ def serve(settings: Settings) -> None:
 def _prepare(settings: Settings) -> None:
     """Meet what would keep the service from starting while it can still be said in words."""
     try:
-        ArtifactStore(settings.artifact_dir)
+        open_artifacts(settings)
         database = Database(settings.resolved_database_url)
         database.migrate()
         database.close()

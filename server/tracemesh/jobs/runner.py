@@ -12,6 +12,7 @@ from tracemesh.errors import NotFound
 from tracemesh.jobs.slot import Slot
 from tracemesh.jobs.work import load_kernel, work
 from tracemesh.settings import Settings
+from tracemesh.storage.artifacts import open_artifacts
 from tracemesh.storage.database import Database
 from tracemesh.storage.reconstructions import claim, finish, get_reconstruction, requeue, requeue_unfinished
 from tracemesh.wire.resources import Reconstruction
@@ -31,6 +32,7 @@ class JobRunner:
         self._listener = listener
         self._waiting: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._closing = threading.Event()
+        self._store = open_artifacts(settings)
         self._slots = [Slot() for _ in range(settings.job_slots)]
         with database.write() as transaction:
             for identifier in requeue_unfinished(transaction):
@@ -71,9 +73,9 @@ class JobRunner:
             attempt = claim(transaction, identifier)
         if attempt is None:
             return
-        settings = self._settings
+        database_url = self._settings.resolved_database_url
         try:
-            future = slot.submit(work, settings.resolved_database_url, settings.artifact_dir, identifier, attempt)
+            future = slot.submit(work, database_url, self._store, identifier, attempt)
             self._watch(future, identifier)
             future.result()
         except BrokenProcessPool:

@@ -3,7 +3,6 @@
 The kernel is imported where it runs: the server itself stays small and starts at once.
 """
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tracemesh.errors import Cancelled, TracemeshError
@@ -22,11 +21,11 @@ def load_kernel() -> None:
     import tracemesh.pipeline  # noqa: F401 - work finds it loaded
 
 
-def work(database_url: str, artifact_dir: Path, identifier: str, attempt: int) -> None:
+def work(database_url: str, store: ArtifactStore, identifier: str, attempt: int) -> None:
     """Run an attempt to its end, whatever that is; the row tells."""
     database = Database(database_url)
     try:
-        _Attempt(database, ArtifactStore(artifact_dir), identifier, attempt).run()
+        _Attempt(database, store, identifier, attempt).run()
     finally:
         database.close()
 
