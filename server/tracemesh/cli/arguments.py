@@ -5,11 +5,11 @@ import math
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 from tracemesh.wire.resources import ReconstructionParameters
 
-Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 T = TypeVar("T")
 Number = TypeVar("Number", int, float)
 MESH_FORMATS = ("glb", "obj", "ply", "stl")
