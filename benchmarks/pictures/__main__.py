@@ -16,6 +16,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "orientation": curves.orientation,
     "fusion": devices.fusion,
     "magnetic_field": devices.magnetic_field,
+    "calibration": devices.calibration,
     "sketch": devices.sketch,
     "cleaning": curves.cleaning,
     "resampling": curves.resampling,

@@ -15,9 +15,10 @@ from benchmarks.pictures.canvas import BLUE, GREY, ORANGE, draw_network, figure,
 from tracemesh.errors import InputError
 from tracemesh.geometry.curves.reconstruction import reconstruct_network
 from tracemesh.geometry.scan import CurveScan, Scan
+from tracemesh.geometry.sensing.calibration import fit_calibration
 from tracemesh.geometry.sensing.fusion import frames_from_imu
 from tracemesh.geometry.sensing.magnetic_field import field_at
-from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_vectors
+from tracemesh.geometry.sensing.orientation import ReferenceField, angles_between, frames_from_vectors
 from tracemesh.geometry.simulated.shapes import leaf
 from tracemesh.geometry.simulated.simulation import exact_scan
 
@@ -49,6 +50,28 @@ def magnetic_field() -> Figure:
     axes.plot(45.19, _inclination(45.19, 5.72), "o", ms=5, color=BLUE)
     axes.annotate("Grenoble", (45.19, _inclination(45.19, 5.72)), (4, -10), textcoords="offset points", fontsize=8)
     axes.legend(fontsize=7, frameon=False)
+    return drawn
+
+
+def calibration() -> Figure:
+    """Lengths of a magnetometer's vectors and the heading that they give, before and after calibration."""
+    pose, acceleration, magnetic = _turned_device()
+    fit = fit_calibration(acceleration, magnetic)
+    corrected = fit.magnetometer.correction(magnetic) @ fit.alignment.T
+    drawn = figure()
+    lengths = plane(drawn, 121, "magnetometer in all directions", "x", "y")
+    heading = plane(drawn, 122, "error of the orientation", "degrees", "part of the readings")
+    up = fit.accelerometer.correction(acceleration)
+    for label, a, m, colour in (("as measured", acceleration, magnetic, ORANGE), ("calibrated", up, corrected, BLUE)):
+        lengths.plot(m[:, 0], m[:, 1], ".", ms=2, color=colour)
+        angle = float(np.mean(angles_between(a, m))) - np.pi / 2
+        frames = frames_from_vectors(a, m, ReferenceField.from_inclination(angle))
+        error = np.sort(np.degrees((Rotation.from_matrix(frames) * pose.inv()).magnitude()))
+        middle = f"{label}: median {np.median(error):.1f}°"
+        heading.plot(error, np.linspace(0, 1, len(error)), lw=1.4, color=colour, label=middle)
+    lengths.set_aspect("equal")
+    heading.set_xscale("log")
+    heading.legend(fontsize=7, frameon=False)
     return drawn
 
 
@@ -91,6 +114,18 @@ def _at_uneven_speed(scan: Scan) -> Scan:
         return replace(curve, distance=np.interp(curve.distance, ends, there))
 
     return Scan(tuple(map(stretched, scan.curves)))
+
+
+def _turned_device() -> tuple[Rotation, Floats, Floats]:
+    """Poses all around, and what sensors with offsets, scales and a turned magnetometer measure in them."""
+    generator = np.random.default_rng(1)
+    pose = Rotation.random(1500, rng=generator)
+    up, field = pose.inv().apply([0.0, 0.0, 1.0]), pose.inv().apply(FIELD.magnetic)
+    acceleration = up @ np.diag([1.02, 0.99, 1.03]) + [0.02, -0.01, 0.015]
+    iron = np.array([[1.15, 0.08, 0.0], [0.08, 0.9, -0.05], [0.0, -0.05, 1.0]])
+    magnetic = Rotation.from_rotvec([0.05, -0.02, 0.06]).apply(field) @ iron + [0.35, -0.2, 0.1]
+    noise = generator.normal(0.0, 0.01, (2, len(up), 3))
+    return pose, acceleration + noise[0], magnetic + noise[1]
 
 
 def _shaken_phone() -> tuple[Floats, Floats, Floats, Floats, Rotation]:
