@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +29,11 @@ def issues(glb: bytes) -> list[dict[str, object]]:
 def written(network: bool) -> bytes:
     vertices, faces = leaf().mesh(12)
     curvature, patch = np.linspace(-1, 1, len(vertices)), np.zeros(len(faces), np.int64)
-    mesh = Mesh(vertices, faces, vertex_normals(vertices, faces), curvature, patch)
+    mesh = Mesh(vertices, faces, vertex_normals(vertices, faces), curvature, curvature, patch)
     provenance: dict[str, object] = {"generator": "tracemesh", "recordings": ["a", "b"]}
-    return write_mesh(mesh, "glb", leaf().network(0.05) if network else None, provenance)
+    curves = leaf().network(0.05)
+    curves = replace(curves, uncertainty=np.full(len(curves.points), 0.001))
+    return write_mesh(mesh, "glb", curves if network else None, provenance)
 
 
 def test_with_and_without_the_network() -> None:

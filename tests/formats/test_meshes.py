@@ -2,6 +2,7 @@
 
 import json
 import struct
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ def mesh() -> Mesh:
     vertices, faces = SHAPE.mesh(12)
     normals = np.array(trimesh.Trimesh(vertices, faces, process=False).vertex_normals)
     curvature = np.linspace(-3, 3, len(vertices))
-    return Mesh(vertices, faces, normals, curvature, np.zeros(len(faces), np.int64))
+    return Mesh(vertices, faces, normals, curvature, curvature**2 - 1, np.zeros(len(faces), np.int64))
 
 
 def tree(glb: bytes) -> dict[str, Any]:
@@ -56,21 +57,43 @@ def test_glb_is_y_up_with_normals_curvature_and_network(mesh: Mesh) -> None:
     np.testing.assert_allclose(surface.vertices[:, 1], mesh.vertices[:, 2], atol=1e-7)
     np.testing.assert_allclose(surface.vertices[:, 2], -mesh.vertices[:, 1], atol=1e-7)
     np.testing.assert_allclose(surface.vertex_normals[:, 1], mesh.normals[:, 2], atol=1e-6)
-    np.testing.assert_allclose(surface.vertex_attributes["_MEAN_CURVATURE"].ravel(), mesh.mean_curvature, atol=1e-6)
+    attributes = {name: values.ravel() for name, values in surface.vertex_attributes.items()}
+    np.testing.assert_allclose(attributes["_MEAN_CURVATURE"], mesh.mean_curvature, atol=1e-6)
+    np.testing.assert_allclose(attributes["_GAUSSIAN_CURVATURE"], mesh.gaussian_curvature, atol=1e-6)
+
+
+def network_primitive(glb: bytes) -> dict[str, Any]:
+    part = next(m for m in tree(glb)["meshes"] if m["name"] == "network")
+    (primitive,) = part["primitives"]
+    assert isinstance(primitive, dict)
+    return primitive
+
+
+def accessor_values(glb: bytes, number: int, width: int) -> np.ndarray:
+    document = tree(glb)
+    accessor = document["accessors"][number]
+    start = 28 + struct.unpack("<I", glb[12:16])[0] + document["bufferViews"][accessor["bufferView"]]["byteOffset"]
+    return np.frombuffer(glb, "<f4", width * accessor["count"], start).reshape(-1, 2, width)
+
+
+EDGES = np.concatenate([np.column_stack([s.points[:-1], s.points[1:]]) for s in NETWORK.segments])
 
 
 def test_glb_holds_every_edge_of_the_network_as_a_line(mesh: Mesh) -> None:
     glb = write_mesh(mesh, "glb", NETWORK)
-    document = tree(glb)
-    part = next(m for m in document["meshes"] if m["name"] == "network")
-    (primitive,) = part["primitives"]
+    primitive = network_primitive(glb)
     assert primitive["mode"] == 1
     assert "indices" not in primitive
-    accessor = document["accessors"][primitive["attributes"]["POSITION"]]
-    start = 28 + struct.unpack("<I", glb[12:16])[0] + document["bufferViews"][accessor["bufferView"]]["byteOffset"]
-    ends = np.frombuffer(glb, "<f4", 3 * accessor["count"], start).reshape(-1, 2, 3)
-    wanted = np.concatenate([NETWORK.points[np.column_stack([s.points[:-1], s.points[1:]])] for s in NETWORK.segments])
-    np.testing.assert_allclose(ends[..., [0, 2, 1]] * [1, -1, 1], wanted, atol=1e-7)
+    assert set(primitive["attributes"]) == {"POSITION"}
+    ends = accessor_values(glb, primitive["attributes"]["POSITION"], 3)
+    np.testing.assert_allclose(ends[..., [0, 2, 1]] * [1, -1, 1], NETWORK.points[EDGES], atol=1e-7)
+
+
+def test_glb_holds_the_uncertainty_of_both_ends_of_every_edge(mesh: Mesh) -> None:
+    uncertainty = np.linspace(0.001, 0.002, len(NETWORK.points))
+    glb = write_mesh(mesh, "glb", replace(NETWORK, uncertainty=uncertainty))
+    stated = accessor_values(glb, network_primitive(glb)["attributes"]["_UNCERTAINTY"], 1)
+    np.testing.assert_allclose(stated[..., 0], uncertainty[EDGES], rtol=1e-6)
 
 
 def test_glb_is_right_handed_after_the_change_of_axes(mesh: Mesh) -> None:
@@ -101,6 +124,7 @@ def test_ply_keeps_normals_and_curvature(mesh: Mesh) -> None:
     np.testing.assert_allclose(loaded.vertex_normals, mesh.normals, atol=1e-6)
     data = loaded.metadata["_ply_raw"]["vertex"]["data"]
     np.testing.assert_allclose(data["mean_curvature"], mesh.mean_curvature, atol=1e-6)
+    np.testing.assert_allclose(data["gaussian_curvature"], mesh.gaussian_curvature, atol=1e-6)
 
 
 def test_reads_the_true_meshes(shared_data: Path) -> None:

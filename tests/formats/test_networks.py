@@ -34,6 +34,17 @@ def test_reads_what_is_written_by_hand() -> None:
     assert (network.segments[0].boundary, network.segments[0].curve) == (True, 3)
 
 
+def test_uncertainty_may_be_missing_and_is_kept_where_it_is_known() -> None:
+    assert read_network(json.dumps(GOOD)).uncertainty is None
+    assert read_network(json.dumps(GOOD | {"uncertainty": [0.1, 0.1]})).uncertainty is None
+    assert "uncertainty" not in json.loads(write_network(read_network(json.dumps(GOOD))))
+    known = read_network(json.dumps(GOOD | {"uncertainty": [0.001, 0.1 + 0.2, 0]}))
+    assert known.uncertainty is not None
+    again = read_network(write_network(known)).uncertainty
+    assert again is not None
+    assert again.tobytes() == known.uncertainty.tobytes()
+
+
 FAULTS: list[tuple[dict[str, object], str]] = [
     ({"format": "gltf"}, "format"),
     ({"version": 2}, "version"),
@@ -42,6 +53,7 @@ FAULTS: list[tuple[dict[str, object], str]] = [
     ({"points": [[0, 0, 0], [0, "x", 0], [1, 0, 0]]}, r"points\.1\.1.*'x'"),
     ({"normals": [[0, 0, 1]] * 2}, "each of the 3 points, got 2"),
     ({"normals": [[0, 0, 1], [0, 0, 1], [0, 0, 2]]}, r"normals\[2\].*length 1"),
+    ({"uncertainty": [0.1, -0.1, 0]}, r"uncertainty\.1: .*greater than or equal to 0, got '-0\.1"),
     ({"nodes": [0, 3]}, r"nodes\[1\].*from 0 to 2, got 3"),
     ({"nodes": [0, 0, 2]}, "every node once"),
     ({"segments": []}, "segments"),

@@ -5,7 +5,7 @@ import pytest
 import robust_laplacian
 
 from tracemesh.geometry.network import Floats, Ints
-from tracemesh.geometry.surfaces.curvature import mean_curvature
+from tracemesh.geometry.surfaces.curvature import gaussian_curvature, mean_curvature
 from tracemesh.geometry.surfaces.edges import boundary_vertices, interior_edges, unique_edges
 from tracemesh.geometry.surfaces.flattening import flatten
 from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian, triangle_areas
@@ -97,6 +97,63 @@ def test_mean_curvature_keeps_its_sign() -> None:
     normals = np.column_stack([-y, -x, np.ones_like(x)]) / np.sqrt(1 + x**2 + y**2)[:, None]
     inside = ~boundary_vertices(flat_faces, len(points))
     assert abs(mean_curvature(saddle, flat_faces, normals)[inside]).max() < 0.05
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_gaussian_curvature_of_spheres_seen_from_either_side(side: int) -> None:
+    vertices, faces = icosphere(3)
+    curvature = gaussian_curvature(3 * vertices, faces[:, ::side], side * vertices)
+    np.testing.assert_allclose(curvature, 1 / 9, rtol=1e-12)
+
+
+def curved_torus(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, faces, normals, mean and Gaussian curvature of a torus, R = 1, r = 0.4, with shuffled diagonals."""
+    one, other = np.meshgrid(np.arange(2 * count), np.arange(count), indexing="ij")
+    u, v = (np.pi / count * one).ravel(), (2 * np.pi / count * other).ravel()
+    outward = np.column_stack([np.cos(u) * np.cos(v), np.sin(u) * np.cos(v), np.sin(v)])
+    vertices = np.column_stack([np.cos(u), np.sin(u), 0 * u]) + 0.4 * outward
+
+    def corner(i: int, j: int) -> np.ndarray:
+        return ((one + i) % (2 * count) * count + (other + j) % count).ravel()
+
+    a, b, c, d = corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)
+    swapped = np.random.default_rng(0).random(len(a)) < 0.5
+    a, b, c, d = (np.where(swapped, x, y) for x, y in ((b, a), (c, b), (d, c), (a, d)))
+    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    across = np.cos(v) / (1 + 0.4 * np.cos(v))
+    return vertices, faces, outward, (across + 1 / 0.4) / 2, across / 0.4
+
+
+def test_curvatures_of_a_torus_converge_on_a_mesh_without_order() -> None:
+    """Saddles and hollows included; an angle defect over an area would not converge here."""
+    errors = []
+    for count in (16, 32, 64):
+        vertices, faces, normals, mean, gaussian = curved_torus(count)
+        found = mean_curvature(vertices, faces, normals) - mean, gaussian_curvature(vertices, faces, normals) - gaussian
+        errors.append([np.sqrt(np.mean(e**2)) for e in found])
+    order = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert order.min() > 0.9
+    assert max(errors[-1]) < 0.05
+
+
+def test_total_gaussian_curvature_is_the_euler_number() -> None:
+    """Gauss-Bonnet: 4 pi on a sphere, 0 on a torus."""
+    vertices, faces, normals, _, _ = curved_torus(64)
+    area = cotangent_laplacian(vertices[faces], faces, len(vertices)).mass
+    assert abs(area @ gaussian_curvature(vertices, faces, normals)) < 0.01
+    vertices, faces = icosphere(4)
+    area = cotangent_laplacian(vertices[faces], faces, len(vertices)).mass
+    assert area @ gaussian_curvature(vertices, faces, vertices) == pytest.approx(4 * np.pi, rel=5e-3)
+
+
+def test_gaussian_curvature_on_an_open_boundary_is_that_of_the_faces_there() -> None:
+    points, faces = disk()
+    x, y = 0.3 * points.T
+    saddle = np.column_stack([x, y, x * y])
+    steep = 1 + x**2 + y**2
+    normals = np.column_stack([-y, -x, np.ones_like(x)]) / np.sqrt(steep)[:, None]
+    error = gaussian_curvature(saddle, faces, normals) + 1 / steep**2
+    assert abs(error).max() < 0.03
 
 
 def test_unrolling_a_cylinder_is_isometric() -> None:

@@ -115,6 +115,8 @@ def test_rotation_translation_and_scale_do_not_matter(scale: float) -> None:
     distance, same = cKDTree(scale * one.vertices @ turn.T + shift).query(other.vertices)
     assert distance.max() < 1e-9 * moved.diagonal
     np.testing.assert_allclose(one.mean_curvature[same] / scale, other.mean_curvature, atol=1e-6 / scale)
+    gaussian = one.gaussian_curvature[same] / scale**2
+    np.testing.assert_allclose(gaussian, other.gaussian_curvature, atol=1e-5 / scale**2)
 
 
 def test_order_and_direction_of_curves_do_not_matter() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 from trimesh.exchange.gltf import export_glb
 from trimesh.exchange.obj import export_obj
 from trimesh.exchange.ply import export_ply
@@ -33,8 +34,9 @@ def write_mesh(
 ) -> bytes:
     """File of a mesh; extension: glb, obj, ply or stl; raises InputError for any other.
 
-    GLB: a node `surface` with normals and the attribute _MEAN_CURVATURE (1/m); with a network, a node `network` of
-    line segments; provenance in asset.extras. PLY keeps normals and mean_curvature, OBJ normals, STL triangles only.
+    GLB: a node `surface` with normals and the attributes _MEAN_CURVATURE (1/m) and _GAUSSIAN_CURVATURE (1/m^2); with a
+    network, a node `network` of line segments, with the attribute _UNCERTAINTY (m) where that is known; provenance in
+    asset.extras. PLY keeps normals, mean_curvature and gaussian_curvature, OBJ normals, STL triangles only.
     """
     writers: dict[str, Callable[[], bytes]] = {
         "glb": lambda: _glb(mesh, network, provenance or {}),
@@ -92,7 +94,7 @@ def _arrays(found: list[Any], name: str, extension: str) -> tuple[Floats, Ints]:
 
 
 def _glb(mesh: Mesh, network: CurveNetwork | None, provenance: Provenance) -> bytes:
-    attributes = {"_MEAN_CURVATURE": mesh.mean_curvature.astype(np.float32)}
+    attributes = {f"_{name.upper()}": values for name, values in _curvatures(mesh).items()}
     surface = _trimesh(
         _y_up(mesh.vertices),
         mesh.faces,
@@ -103,8 +105,7 @@ def _glb(mesh: Mesh, network: CurveNetwork | None, provenance: Provenance) -> by
     scene = trimesh.Scene()
     scene.add_geometry(surface, node_name="surface", geom_name="surface")
     if network is not None:
-        lines = Path3D([Line(s.points) for s in network.segments], _y_up(network.points), process=False)
-        scene.add_geometry(lines, node_name="network", geom_name="network")
+        scene.add_geometry(_lines(network), node_name="network", geom_name="network")
 
     def describe(tree: dict[str, Any]) -> None:
         tree["asset"] = {
@@ -122,9 +123,20 @@ def _obj(mesh: Mesh) -> bytes:
 
 
 def _ply(mesh: Mesh) -> bytes:
-    attributes = {"mean_curvature": mesh.mean_curvature.astype(np.float32)}
-    surface = _trimesh(mesh.vertices, mesh.faces, vertex_normals=mesh.normals, vertex_attributes=attributes)
+    surface = _trimesh(mesh.vertices, mesh.faces, vertex_normals=mesh.normals, vertex_attributes=_curvatures(mesh))
     return bytes(export_ply(surface, vertex_normal=True))
+
+
+def _curvatures(mesh: Mesh) -> dict[str, NDArray[np.float32]]:
+    named = {"mean_curvature": mesh.mean_curvature, "gaussian_curvature": mesh.gaussian_curvature}
+    return {name: values.astype(np.float32) for name, values in named.items()}
+
+
+def _lines(network: CurveNetwork) -> Path3D:
+    """The network's edges, each a line of its own: values at points are written for lines of equal length only."""
+    edges = np.concatenate([np.column_stack([s.points[:-1], s.points[1:]]) for s in network.segments])
+    known = {} if network.uncertainty is None else {"_UNCERTAINTY": network.uncertainty}
+    return Path3D([Line(edge) for edge in edges], _y_up(network.points), vertex_attributes=known, process=False)
 
 
 def _trimesh(vertices: Floats, faces: Ints, **properties: Any) -> trimesh.Trimesh:

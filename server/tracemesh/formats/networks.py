@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -29,6 +30,7 @@ class _NetworkModel(BaseModel):
     normals: list[tuple[float, float, float]]
     nodes: list[int]
     segments: list[_SegmentModel] = Field(min_length=1)
+    uncertainty: list[Annotated[float, Field(ge=0)]] | None = None
 
 
 def read_network(text: str, source: str = "") -> CurveNetwork:
@@ -42,11 +44,14 @@ def read_network(text: str, source: str = "") -> CurveNetwork:
     if fault:
         raise InputError(prefix + fault)
     segments = tuple(Segment(np.array(s.points, np.int64), s.boundary, s.curve) for s in model.segments)
-    return CurveNetwork(_rows(model.points), _rows(model.normals), _integers(model.nodes), segments)
+    return CurveNetwork(
+        _rows(model.points), _rows(model.normals), _integers(model.nodes), segments, _uncertainty(model)
+    )
 
 
 def write_network(network: CurveNetwork) -> str:
     """JSON text of which `read_network` makes the same network, bit for bit."""
+    known = {} if network.uncertainty is None else {"uncertainty": network.uncertainty.tolist()}
     document = {
         "format": "tracemesh-network",
         "version": 1,
@@ -57,8 +62,15 @@ def write_network(network: CurveNetwork) -> str:
         "segments": [
             {"points": s.points.tolist(), "boundary": bool(s.boundary), "curve": int(s.curve)} for s in network.segments
         ],
+        **known,
     }
     return json.dumps(document, allow_nan=False) + "\n"
+
+
+def _uncertainty(model: _NetworkModel) -> Floats | None:
+    """None also where it is not one number a point: then the points were edited by what does not know it."""
+    known = model.uncertainty is not None and len(model.uncertainty) == len(model.points)
+    return np.array(model.uncertainty, np.float64) if known else None
 
 
 def _faults(model: _NetworkModel) -> Iterator[str]:

@@ -27,13 +27,15 @@ class CurveNetwork:
     """Curves on a surface that meet in nodes.
 
     points: (n, 3) m, world; every point once, nodes included. normals: (n, 3) outward unit surface normals.
-    nodes: (k,) indices of the points that are nodes. segments: the polylines between them.
+    nodes: (k,) indices of the points that are nodes. segments: the polylines between them. uncertainty: (n,) m, root
+    mean square distance of each point from the truth; None where nobody knows it.
     """
 
     points: Floats
     normals: Floats
     nodes: Ints
     segments: tuple[Segment, ...]
+    uncertainty: Floats | None = None
 
     @property
     def diagonal(self) -> float:

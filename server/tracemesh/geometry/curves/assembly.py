@@ -37,14 +37,16 @@ def _normals(layout: Layout, frames: Floats) -> Floats:
     return normals
 
 
-def assemble_network(layout: Layout, points: Floats, frames: Floats, curves: Ints) -> CurveNetwork:
-    """Network of points (n, 3), m, and frames (n, 3, 3) at a layout's rows; curves: (c,) index of each in the scan.
+def assemble_network(layout: Layout, points: Floats, frames: Floats, uncertainty: Floats, curves: Ints) -> CurveNetwork:
+    """Network of points (n, 3), m, and frames (n, 3, 3) at a layout's rows.
 
-    The place where a closed curve without nodes was started is no node of the network.
+    uncertainty: (p,) m, of the network's points. curves: (c,) index of each in the scan. The place where a closed curve
+    without nodes was started is no node of the network.
     """
     point = point_of_row(layout)
     segments = []
     for (start, end), curve in zip(layout.segment_rows, layout.segment_curve, strict=True):
         segments.append(Segment(point[start : end + 1], bool(layout.boundary[curve]), int(curves[curve])))
     nodes = np.flatnonzero(layout.is_node)
-    return CurveNetwork(per_point(layout, points), _normals(layout, frames), nodes, tuple(segments))
+    normals = _normals(layout, frames)
+    return CurveNetwork(per_point(layout, points), normals, nodes, tuple(segments), uncertainty)

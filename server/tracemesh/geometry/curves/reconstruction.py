@@ -136,11 +136,11 @@ class NetworkReconstruction:
         self._stages.begin("positions")
         positions = self._positions(layout, regression.frames)
         self._stages.begin("uncertainty")
-        uncertainty = self._uncertainty(layout, positions, regression.frames)
-        network = assemble_network(layout, positions.points, regression.frames, self._indices)
+        uncertainty = per_point(layout, self._uncertainty(layout, positions, regression.frames))
+        network = assemble_network(layout, positions.points, regression.frames, uncertainty, self._indices)
         self._stages.end()
         report = self._report(network, regression, positions, used, uncertainty)
-        return NetworkResult(network, per_point(layout, regression.frames), per_point(layout, uncertainty), report)
+        return NetworkResult(network, per_point(layout, regression.frames), uncertainty, report)
 
     def _uncertainty(self, layout: Layout, positions: Positions, frames: Floats) -> Floats:
         if self._closed is None:

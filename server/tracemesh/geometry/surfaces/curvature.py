@@ -1,4 +1,4 @@
-"""Mean curvature from positions and propagated normals (thesis section 4.5.2, Eq. 4.18), with its sign.
+"""Mean and Gaussian curvature from positions and propagated normals (thesis section 4.5.2, Eq. 4.18), with their signs.
 
 The printed -|H| N bends every patch outwards; the component along the normal keeps saddles and hollows.
 """
@@ -23,6 +23,25 @@ def mean_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
     flux = 0.5 * (np.cross(opposite, facing[:, None]) * normals[faces]).sum(2)
     total = np.bincount(faces.ravel(), flux.ravel(), len(vertices))
     return np.asarray(-0.5 * total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
+
+
+def gaussian_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
+    """(n,) 1/m^2, product of the principal curvatures, 1/r^2 on a sphere of radius r, negative on saddles.
+
+    vertices, normals: (n, 3). faces: (f, 3). Gauss's definition: the area that the normals of the faces around a vertex
+    sweep on the unit sphere, seen along the faces' own normals, over the area of these faces; also on an open boundary.
+    The angle that a vertex lacks to 2 pi, over its area, does not converge where vertices have other than six edges.
+    """
+    corners, turned = vertices[faces], normals[faces]
+    own = normalised(_spanned(corners))
+    swept = 0.5 * (_spanned(turned) * own).sum(1)
+    total = np.bincount(faces.ravel(), np.repeat(swept / 3, 3), len(vertices))
+    return np.asarray(total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
+
+
+def _spanned(corners: Floats) -> Floats:
+    """(f, 3) cross products of two edges of triangles (f, 3, 3)."""
+    return np.asarray(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
 def extended_to_boundary(values: Floats, faces: Ints, open_boundary: NDArray[np.bool_]) -> Floats:

@@ -61,7 +61,7 @@ def _inserted(network: CurveNetwork, edge: Ints, share: Floats) -> CurveNetwork:
         points.append(between)
         normals.append(facing)
         count, first = count + len(between), last
-    return replace(network, points=np.vstack(points), normals=np.vstack(normals), segments=tuple(segments))
+    return CurveNetwork(np.vstack(points), np.vstack(normals), network.nodes, tuple(segments))
 
 
 def _on_spline(network: CurveNetwork, segment: Segment, edge: Ints, share: Floats) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from tracemesh.errors import SurfaceError
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
 from tracemesh.geometry.surfaces.cell_complex import CellComplex, cell_complex, segment_name
-from tracemesh.geometry.surfaces.curvature import extended_to_boundary, mean_curvature
+from tracemesh.geometry.surfaces.curvature import extended_to_boundary, gaussian_curvature, mean_curvature
 from tracemesh.geometry.surfaces.edges import boundary_vertices
 from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian
 from tracemesh.geometry.surfaces.linear_surface import linear_surface, rebuilt_surface
@@ -104,7 +104,7 @@ def finished(
     stages.end()
     faces, boundary = patches.faces, boundary_vertices(patches.faces, patches.count)
     curvature = extended_to_boundary(mean_curvature(vertices, faces, normals), faces, boundary)
-    mesh = Mesh(vertices, faces, normals, curvature, patches.patch)
+    mesh = Mesh(vertices, faces, normals, curvature, gaussian_curvature(vertices, faces, normals), patches.patch)
     return SurfaceResult(mesh, _report(mesh, complex_, stages) | {"refinement": refinement})
 
 
