@@ -366,6 +366,22 @@ export interface NodeProposals {
   unplaced: number[];
 }
 /**
+ * GET /sessions/{session}/outline: what it looks like, in few points; for a list of many sessions.
+ */
+export interface Outline {
+  curves: OutlineCurve[];
+}
+/**
+ * One line of an outline.
+ */
+export interface OutlineCurve {
+  boundary: boolean;
+  /**
+   * m, world: [x0, y0, z0, x1, ...]
+   */
+  positions: number[];
+}
+/**
  * Answer to POST /sessions/{session}/preview: the network that these parameters give, without its surface.
  */
 export interface Preview {

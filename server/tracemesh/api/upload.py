@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from starlette.requests import Request
+
 from tracemesh.api.recorder import Recorder
 from tracemesh.errors import InputError, NotFound, Refused
 from tracemesh.formats.rawnet import read_rawnet
@@ -20,6 +22,24 @@ def file_body(*media_types: str) -> dict[str, object]:
     return {"requestBody": {"required": True, "content": content}}
 
 
+async def read_body(request: Request, limit: int) -> bytes:
+    """A file that is the body of a request; raises InputError when it has more than `limit` bytes."""
+    content = bytearray()
+    async for chunk in request.stream():
+        content += chunk
+        if len(content) > limit:
+            raise InputError(f"wanted a file of at most {limit} bytes")
+    return bytes(content)
+
+
+def utf8(content: bytes) -> str:
+    """Text of a file; raises InputError with the place of the first byte that is none."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"wanted UTF-8 text, got byte 0x{content[error.start]:02x} at {error.start}") from None
+
+
 @dataclass(frozen=True)
 class Upload:
     """A recording and its messages, read and byte for byte."""
@@ -31,10 +51,7 @@ class Upload:
 
 def parse_upload(content: bytes, session: str, name: str) -> Upload:
     """A rawnet, to be recorded under `name`, or a recording, which has one; raises InputError with the line."""
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"wanted UTF-8 text, got byte 0x{content[error.start]:02x} at {error.start}") from None
+    text = utf8(content)
     if not is_recording(text):
         text = write_recording(recording_from_scan(read_rawnet(text), name, session))
     lines = [line for line in text.split("\n") if line.strip()]

@@ -6,14 +6,18 @@ The kernel is imported where it runs: the server itself stays small and starts a
 from typing import TYPE_CHECKING
 
 from tracemesh.errors import Cancelled, TracemeshError
-from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.formats.networks import read_network
+from tracemesh.storage.artifacts import ArtifactStore, artifact_row
 from tracemesh.storage.database import Database
 from tracemesh.storage.reconstructions import finish, get_reconstruction, report_progress
 from tracemesh.storage.scans import load_scan
-from tracemesh.wire.resources import JobState
+from tracemesh.wire.resources import JobState, Reconstruction
 
 if TYPE_CHECKING:
-    from tracemesh.pipeline import Reconstruction
+    from tracemesh.pipeline import Reconstruction as Result
+
+
+NETWORK = "network.json"
 
 
 def load_kernel() -> None:
@@ -48,15 +52,28 @@ class _Attempt:
             self._end("failed", "it needs more memory than there is")
 
     def _reconstruct(self) -> None:
+        with self._database.read() as transaction:
+            wanted = get_reconstruction(transaction, self._identifier)
+        result = self._span(wanted) if NETWORK in wanted.artifacts else self._from_scan(wanted)
+        files = {name: content for name, content in _files(result).items() if name not in wanted.artifacts}
+        artifacts = {name: (self._store.put(content), len(content)) for name, content in files.items()}
+        with self._database.write() as transaction:
+            finish(transaction, self._identifier, self._attempt, "done", artifacts=artifacts)
+
+    def _from_scan(self, wanted: Reconstruction) -> "Result":
         from tracemesh.pipeline import reconstruct
 
         with self._database.read() as transaction:
-            wanted = get_reconstruction(transaction, self._identifier)
             scan, _ = load_scan(transaction, wanted.session)
-        result = reconstruct(scan, wanted.parameters, self._progress)
-        artifacts = {name: (self._store.put(content), len(content)) for name, content in _files(result).items()}
-        with self._database.write() as transaction:
-            finish(transaction, self._identifier, self._attempt, "done", artifacts=artifacts)
+        return reconstruct(scan, wanted.parameters, self._progress)
+
+    def _span(self, wanted: Reconstruction) -> "Result":
+        """The surface over the network that came with the wish."""
+        from tracemesh.pipeline import span
+
+        with self._database.read() as transaction:
+            digest = artifact_row(transaction, wanted.id, NETWORK).sha256
+        return span(read_network(self._store.path(digest).read_text("utf-8"), NETWORK), self._progress)
 
     def _progress(self, stage: str, fraction: float) -> None:
         with self._database.write() as transaction:
@@ -68,6 +85,6 @@ class _Attempt:
             finish(transaction, self._identifier, self._attempt, state, error)
 
 
-def _files(result: "Reconstruction") -> dict[str, bytes]:
-    files = {"network.json": result.network_file(), "report.json": result.report_file()}
+def _files(result: "Result") -> dict[str, bytes]:
+    files = {NETWORK: result.network_file(), "report.json": result.report_file()}
     return files if result.mesh is None else {**files, "mesh.glb": result.mesh_file()}

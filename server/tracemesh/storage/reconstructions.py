@@ -34,6 +34,14 @@ def create_reconstruction(
     return describe(transaction, row)
 
 
+def give_artifact(transaction: Transaction, identifier: str, name: str, digest: str, size: int) -> Reconstruction:
+    """Let a reconstruction have a file before it runs: a network that is known already. Raises NotFound."""
+    row = _row(transaction, identifier)
+    transaction.add(ArtifactRow(reconstruction_id=row.id, name=name, sha256=digest, size=size))
+    transaction.flush()
+    return describe(transaction, row)
+
+
 def get_reconstruction(transaction: Transaction, identifier: str) -> Reconstruction:
     """One reconstruction; raises NotFound."""
     return describe(transaction, _row(transaction, identifier))

@@ -34,6 +34,19 @@ class Session(Message):
     latest_reconstruction: Identifier | None = Field(default=None, description="newest one that is done")
 
 
+class OutlineCurve(Message):
+    """One line of an outline."""
+
+    boundary: bool
+    positions: list[float] = Field(description="m, world: [x0, y0, z0, x1, ...]")
+
+
+class Outline(Message):
+    """GET /sessions/{session}/outline: what it looks like, in few points; for a list of many sessions."""
+
+    curves: list[OutlineCurve]
+
+
 class Mark(Message):
     """A node marked on a curve."""
 

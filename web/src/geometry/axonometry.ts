@@ -36,6 +36,18 @@ export function fitInto(lists: readonly ArrayLike<number>[], width: number, heig
   return { scale, x: width / 2 - scale * middle(0), y: height / 2 - scale * middle(1) };
 }
 
+/** SVG paths of lines (flat lists, m) that fill a picture of this size with a margin, px; empty when there are none. */
+export function linePaths(lists: readonly ArrayLike<number>[], width: number, height: number, margin: number): string[] {
+  const lines = lists.map((list) => allSeen(list));
+  const fit = fitInto(lines, width, height, margin);
+  if (!fit) return [];
+  const place = (value: number | undefined, shift: number): string => (shift + fit.scale * (value ?? 0)).toFixed(1);
+  return lines.map((line) => {
+    const pairs = Array.from({ length: line.length / 2 }, (_, i) => `${place(line[2 * i], fit.x)} ${place(line[2 * i + 1], fit.y)}`);
+    return pairs.length ? `M${pairs.join("L")}` : "";
+  });
+}
+
 function spread(list: ArrayLike<number>): Float64Array {
   const result = new Float64Array((3 * list.length) / 2);
   for (let i = 0; i < list.length / 2; i += 1) result.set([list[2 * i] as number, list[2 * i + 1] as number], 3 * i);

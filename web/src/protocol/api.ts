@@ -2,6 +2,7 @@ import type {
   Curve,
   CurveUpdate,
   NodeProposals,
+  Outline,
   Preview,
   Problem,
   Reconstruction,
@@ -70,6 +71,16 @@ export class Api {
   async upload(session: string, file: Blob): Promise<RecordingSummary> {
     const path = `/sessions/${session}/recordings`;
     return (await (await this.#request("POST", path, file, "application/octet-stream")).json()) as RecordingSummary;
+  }
+
+  /** Take in a network JSON; the job spans its surface. */
+  openNetwork(session: string, file: Blob): Promise<Reconstruction> {
+    return this.#json<Reconstruction>("POST", `/sessions/${session}/networks`, file);
+  }
+
+  /** What a session looks like, in few points. */
+  outline(session: string): Promise<Outline> {
+    return this.#json<Outline>("GET", `/sessions/${session}/outline`);
   }
 
   reconstruct(session: string, parameters: Partial<ReconstructionParameters>): Promise<Reconstruction> {

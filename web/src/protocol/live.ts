@@ -60,7 +60,7 @@ export class LiveSocket {
   }
 
   #connect(): void {
-    this.handlers.state("connecting");
+    if (this.#attempt === 0) this.handlers.state("connecting");
     const socket = this.surroundings.open(this.url);
     this.#socket = socket;
     socket.onopen = () => this.handlers.state("open");

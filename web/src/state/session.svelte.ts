@@ -13,6 +13,7 @@ import type {
   RecordingSummary,
   Session,
 } from "../wire.gen";
+import { putIn } from "./files";
 import { History } from "./history.svelte";
 import { Network } from "./network";
 import { Latest } from "./latest";
@@ -47,6 +48,10 @@ export class SessionStore {
   devices = $state.raw<readonly LiveDevice[]>([]);
   curves = $state.raw<readonly CurveEntry[]>([]);
   nodes = $state.raw<readonly number[]>([]);
+  /** Whether the server told what there is. */
+  known = $state(false);
+  /** Whether curves were scanned here, which may be edited; a network that was opened is as it is in its file. */
+  scanned = $state(false);
   reconstruction = $state.raw<Reconstruction>();
   result = $state.raw<Result>();
   /** The network with parameters that a hand is moving. */
@@ -119,7 +124,7 @@ export class SessionStore {
   /** Take in files as if devices had sent them. */
   async upload(files: readonly File[]): Promise<void> {
     await this.#command(async () => {
-      for (const file of files) await this.api.upload(this.id, file);
+      for (const file of files) await putIn(this.api, this.id, file);
       this.#outdate();
     });
   }
@@ -218,6 +223,7 @@ export class SessionStore {
     if (change === "gap") return this.#socket?.restart();
     if (message.type === "live.snapshot" || message.type === "live.curve.start") void this.#listRecordings();
     if (message.type === "live.snapshot") {
+      this.known = true;
       this.#heard(message.devices);
       if (message.reconstruction) this.#progressed(message.reconstruction);
     }
@@ -276,6 +282,7 @@ export class SessionStore {
   #redraw(): void {
     this.replacements += 1;
     this.revision += 1;
+    this.#listSoon();
   }
 
   async #listRecordings(): Promise<void> {
@@ -286,14 +293,16 @@ export class SessionStore {
   #listSoon(): void {
     this.#listTimer ??= setTimeout(() => {
       this.#listTimer = undefined;
-      this.curves = [...this.live.curves.values()].map((curve) => ({
+      this.scanned = this.live.curves.size > 0;
+      const listed = this.scanned ? this.live : this.network;
+      this.curves = [...listed.curves.values()].map((curve) => ({
         index: curve.index,
         boundary: curve.boundary,
         closed: curve.closed,
         ended: curve.ended,
         length: polylineLength(curve.points.coordinates),
       }));
-      this.nodes = [...this.live.nodes.keys()].sort((a, b) => a - b);
+      this.nodes = [...listed.nodes.keys()].sort((a, b) => a - b);
     }, LIST_PAUSE);
   }
 

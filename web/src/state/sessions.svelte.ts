@@ -1,5 +1,6 @@
 import type { Api } from "../protocol/api";
 import type { Session } from "../wire.gen";
+import { nameFor, putIn } from "./files";
 import { inWords } from "./session.svelte";
 
 const UNDO_SECONDS = 6;
@@ -36,9 +37,9 @@ export class SessionsStore {
     const [first] = files;
     if (!first) return undefined;
     return this.#attempt(async () => {
-      const session = await this.api.createSession(first.name.replace(/\.[^.]*$/, ""));
+      const session = await this.api.createSession(nameFor(first.name));
       try {
-        for (const file of files) await this.api.upload(session.id, file);
+        for (const file of files) await putIn(this.api, session.id, file);
       } catch (error) {
         await this.api.deleteSession(session.id);
         throw new Error(`${first.name} was not opened: ${inWords(error)}`, { cause: error });

@@ -2,10 +2,13 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import FileResponse
+from starlette.concurrency import run_in_threadpool
 
-from tracemesh.api.services import IdempotencyKey, Reading, UseServices
+from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
+from tracemesh.api.upload import file_body, read_body, utf8
+from tracemesh.formats.networks import read_network
 from tracemesh.storage import reconstructions
 from tracemesh.storage.artifacts import MEDIA_TYPES, artifact_row
 from tracemesh.storage.models import derived_id
@@ -29,6 +32,28 @@ def create(
         derived = idempotency_key and derived_id(idempotency_key, session)
         wanted = parameters or ReconstructionParameters()
         made = reconstructions.create_reconstruction(transaction, session, wanted, derived)
+    return _queued(services, response, made)
+
+
+@router.post("/sessions/{session}/networks", status_code=202, openapi_extra=file_body("application/json"))
+async def span(session: Identifier, request: Request, services: UseServices, response: Response) -> Reconstruction:
+    """Take in a curve network that is known already (network JSON) and queue the surface that spans it."""
+    content = await read_body(request, services.settings.max_upload_bytes)
+    made = await run_in_threadpool(_store_network, services, session, content)
+    return _queued(services, response, made)
+
+
+def _store_network(services: Services, session: str, content: bytes) -> Reconstruction:
+    text = utf8(content)
+    read_network(text)
+    stored = text.encode()
+    digest = services.artifacts.put(stored)
+    with services.database.write() as transaction:
+        made = reconstructions.create_reconstruction(transaction, session, ReconstructionParameters())
+        return reconstructions.give_artifact(transaction, made.id, "network.json", digest, len(stored))
+
+
+def _queued(services: Services, response: Response, made: Reconstruction) -> Reconstruction:
     services.runner.submit(made.id)
     services.loop.call_soon_threadsafe(services.hub.progressed, made)
     response.headers["Location"] = f"/api/v1/reconstructions/{made.id}"

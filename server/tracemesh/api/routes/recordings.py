@@ -7,8 +7,7 @@ from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
 from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
-from tracemesh.api.upload import file_body, parse_upload, store_upload
-from tracemesh.errors import InputError
+from tracemesh.api.upload import file_body, parse_upload, read_body, store_upload
 from tracemesh.storage import recordings
 from tracemesh.storage.models import derived_id, new_id
 from tracemesh.storage.recordings import recording_messages, recording_row
@@ -42,22 +41,13 @@ async def upload(
     idempotency_key: IdempotencyKey = None,
 ) -> RecordingSummary:
     """Take in a rawnet or a recording, told apart by their first character; a recording sent before is completed."""
-    content = await _body(request, services.settings.max_upload_bytes)
+    content = await read_body(request, services.settings.max_upload_bytes)
     name = f"file-{derived_id(idempotency_key, session) if idempotency_key else new_id()}"
     parsed = await run_in_threadpool(parse_upload, content, session, name)
     await store_upload(services.recorder, parsed)
     services.edited(session)
     response.headers["Location"] = f"/api/v1/sessions/{session}/recordings/{parsed.hello.recording}"
     return await run_in_threadpool(_summary, services, session, parsed.hello.recording)
-
-
-async def _body(request: Request, limit: int) -> bytes:
-    content = bytearray()
-    async for chunk in request.stream():
-        content += chunk
-        if len(content) > limit:
-            raise InputError(f"wanted a file of at most {limit} bytes")
-    return bytes(content)
 
 
 def _summary(services: Services, session: str, recording: str) -> RecordingSummary:

@@ -4,11 +4,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from tracemesh.api.outline import outline
 from tracemesh.api.services import IdempotencyKey, Reading, UseServices, Writing
 from tracemesh.storage import sessions
 from tracemesh.storage.models import derived_id
 from tracemesh.wire.base import Identifier
-from tracemesh.wire.resources import Session, SessionCreate, SessionUpdate
+from tracemesh.wire.resources import Outline, Session, SessionCreate, SessionUpdate
 
 router = APIRouter(prefix="/sessions", tags=["sessions"])
 
@@ -42,6 +43,12 @@ def list_all(
 def get(session: Identifier, transaction: Reading) -> Session:
     """One session."""
     return sessions.get_session(transaction, session)
+
+
+@router.get("/{session}/outline")
+def draw(session: Identifier, transaction: Reading, services: UseServices) -> Outline:
+    """Its curves in few points: as reconstructed, else as reckoned from what was sent."""
+    return outline(transaction, services.artifacts, session)
 
 
 @router.patch("/{session}")
