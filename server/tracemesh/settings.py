@@ -1,15 +1,21 @@
-"""Settings of the service: one frozen object, read from `TRACEMESH_...` variables; listed in docs/settings.md."""
+"""Settings of the service: one frozen object, from `TRACEMESH_...` variables and a file; listed in docs/settings.md."""
 
+import os
 import re
+import tomllib
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from platformdirs import user_data_path
 from pydantic import Field, SecretStr, field_validator, model_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
+
+from tracemesh.errors import InputError
 
 LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 """Hosts that only this machine reaches."""
+FILE_VARIABLE = "TRACEMESH_SETTINGS"
+"""Names the settings file, if there is one."""
 MIN_TOKEN = 16
 """Fewest characters of a token: shorter ones can be guessed."""
 
@@ -69,6 +75,18 @@ class Settings(BaseSettings):
             )
         return self
 
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """The command line before the environment before the file."""
+        return init_settings, env_settings, InitSettingsSource(settings_cls, _settings_file())
+
     @property
     def resolved_database_url(self) -> str:
         """SQLAlchemy's URL of the database, driver included."""
@@ -81,3 +99,15 @@ class Settings(BaseSettings):
     def artifact_dir(self) -> Path:
         """Folder of the content-addressed artifacts or, with a bucket, of what was used of them lately."""
         return self.data_dir / "artifacts"
+
+
+def _settings_file() -> dict[str, Any]:
+    name = os.environ.get(FILE_VARIABLE)
+    if not name:
+        return {}
+    try:
+        return tomllib.loads(Path(name).read_text())
+    except OSError as error:
+        raise InputError(f"{name}, named by {FILE_VARIABLE}: cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{name}, named by {FILE_VARIABLE}: wanted TOML: {error}") from None

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from pydantic import SecretStr, ValidationError
 
+from tracemesh.errors import InputError
 from tracemesh.settings import MIN_TOKEN, Settings
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "settings.md"
@@ -41,3 +42,30 @@ def test_the_environment_is_read_and_the_token_never_shown(monkeypatch: pytest.M
     settings = Settings()
     assert "horse" not in repr(settings)
     assert settings.resolved_database_url == "postgresql+pg8000://u:p@db/name"
+
+
+def test_the_file_gives_what_the_environment_and_the_command_line_do_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "tracemesh.toml"
+    monkeypatch.setenv("TRACEMESH_SETTINGS", str(file))
+    file.write_text('port = 1\nmax_devices = 2\njob_slots = 3\ndata_dir = "/srv/tracemesh"\n')
+    monkeypatch.setenv("TRACEMESH_MAX_DEVICES", "20")
+    settings = Settings(port=10)
+    assert (settings.port, settings.max_devices, settings.job_slots) == (10, 20, 3)
+    assert settings.data_dir == Path("/srv/tracemesh")
+
+
+@pytest.mark.parametrize(
+    ("content", "wanted"),
+    [(None, "cannot be read"), ("port = ", "wanted TOML"), ("ports = 8000", "ports"), ("port = 'high'", "port")],
+)
+def test_a_file_that_cannot_be_right_is_named(
+    content: str | None, wanted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "tracemesh.toml"
+    if content is not None:
+        file.write_text(content)
+    monkeypatch.setenv("TRACEMESH_SETTINGS", str(file))
+    with pytest.raises((InputError, ValidationError), match=wanted):
+        Settings()

@@ -3,13 +3,12 @@
 import logging
 
 import uvicorn
-from sqlalchemy.exc import SQLAlchemyError
 
 from tracemesh.api.app import create_app
 from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import open_artifacts
-from tracemesh.storage.database import Database
+from tracemesh.storage.database import Database, database_faults_in_words
 
 MAX_MESSAGE = 4 * 2**20
 """Most bytes of one message on a socket."""
@@ -47,11 +46,9 @@ def _prepare(settings: Settings) -> None:
     """Meet what would keep the service from starting while it can still be said in words."""
     try:
         open_artifacts(settings)
-        database = Database(settings.resolved_database_url)
-        database.migrate()
-        database.close()
+        with database_faults_in_words():
+            database = Database(settings.resolved_database_url)
+            database.migrate()
+            database.close()
     except OSError as error:
         raise ResourceError(f"the data folder {settings.data_dir} cannot be used: {error.strerror}") from None
-    except SQLAlchemyError as error:
-        cause = str(getattr(error, "orig", None) or error).splitlines()[0]
-        raise ResourceError(f"the database cannot be used: {cause}") from None

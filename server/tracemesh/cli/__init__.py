@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from tracemesh.cli.reconstruct import add_reconstruct, add_surface
-from tracemesh.cli.service import add_demo, add_serve
+from tracemesh.cli.service import add_backup, add_demo, add_doctor, add_serve
 from tracemesh.cli.shapes import add_evaluate, add_simulate
 from tracemesh.errors import TracemeshError
 
@@ -51,6 +51,6 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"tracemesh {version('tracemesh')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for add in (add_reconstruct, add_surface, add_evaluate, add_simulate, add_serve, add_demo):
+    for add in (add_reconstruct, add_surface, add_evaluate, add_simulate, add_serve, add_backup, add_doctor, add_demo):
         add(commands)
     return parser

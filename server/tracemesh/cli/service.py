@@ -1,10 +1,18 @@
-"""`tracemesh serve` and `tracemesh demo`."""
+"""`tracemesh serve`, what looks after a server, and `tracemesh demo`."""
+
+from __future__ import annotations
 
 import argparse
 import signal
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tracemesh.cli.arguments import Commands, port
+from tracemesh.terminal import ProgressLine
+
+if TYPE_CHECKING:
+    from tracemesh.settings import Settings
 
 
 def add_serve(commands: Commands) -> None:
@@ -18,6 +26,31 @@ def add_serve(commands: Commands) -> None:
     parser.add_argument("--port", type=port, help="port to listen on (default 8000)")
     parser.add_argument("--data-dir", type=Path, metavar="DIR", help="where sessions and meshes are kept")
     parser.set_defaults(command=_serve)
+
+
+def add_backup(commands: Commands) -> None:
+    """All of a server in a folder."""
+    parser = commands.add_parser(
+        "backup",
+        help="copy everything of a server to a folder",
+        description="Copy database and results to a folder while the server runs; again: only what is new.",
+    )
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where to; made when it is missing")
+    parser.add_argument("--data-dir", type=Path, metavar="DIR", help="data folder of the server")
+    parser.set_defaults(command=_backup)
+
+
+def add_doctor(commands: Commands) -> None:
+    """What is wrong."""
+    parser = commands.add_parser(
+        "doctor",
+        help="tell what is wrong with a server",
+        description="Look at data folder, database, results, web page and port, and say in plain words what to mend.",
+    )
+    parser.add_argument("--host", help="address of the server (default 127.0.0.1)")
+    parser.add_argument("--port", type=port, help="port of the server (default 8000)")
+    parser.add_argument("--data-dir", type=Path, metavar="DIR", help="data folder of the server")
+    parser.set_defaults(command=_doctor)
 
 
 def add_demo(commands: Commands) -> None:
@@ -34,13 +67,39 @@ def add_demo(commands: Commands) -> None:
     parser.set_defaults(command=_demo)
 
 
-def _serve(chosen: argparse.Namespace) -> int:
-    from tracemesh.api.server import serve
+def _settings(chosen: argparse.Namespace) -> Settings:
     from tracemesh.settings import Settings
 
-    given = {"host": chosen.host, "port": chosen.port, "data_dir": chosen.data_dir}
-    serve(Settings(**{name: value for name, value in given.items() if value is not None}))
+    given = {name: vars(chosen).get(name) for name in ("host", "port", "data_dir")}
+    return Settings(**{name: value for name, value in given.items() if value is not None})
+
+
+def _serve(chosen: argparse.Namespace) -> int:
+    from tracemesh.api.server import serve
+
+    serve(_settings(chosen))
     return 0
+
+
+def _backup(chosen: argparse.Namespace) -> int:
+    from tracemesh.storage.backup import back_up
+
+    with ProgressLine() as progress:
+        made = back_up(_settings(chosen), chosen.folder, progress)
+    print(f"tracemesh: {made.database} and {made.artifacts - len(made.lost)} artifacts", file=sys.stderr)
+    for digest in made.lost:
+        print(f"tracemesh: artifact {digest} is missing or damaged at its source", file=sys.stderr)
+    return 1 if made.lost else 0
+
+
+def _doctor(chosen: argparse.Namespace) -> int:
+    from tracemesh.doctor import examine
+
+    ill = False
+    for finding in examine(_settings(chosen)):
+        print(finding)
+        ill |= bool(finding.advice)
+    return 1 if ill else 0
 
 
 def _demo(chosen: argparse.Namespace) -> int:

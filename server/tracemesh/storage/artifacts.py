@@ -3,7 +3,7 @@
 import os
 import tempfile
 import time
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
 
@@ -48,14 +48,25 @@ class ArtifactStore:
     def path(self, digest: str) -> Path:
         """A file with this content; raises NotFound or, when a bucket is away or its content damaged, Unavailable."""
         target = self._target(digest)
-        if self._bucket is not None and not target.exists():
+        if self._bucket is not None and not self.has(digest):
             content = self._bucket.get(digest)
             if sha256(content).hexdigest() != digest:
                 raise Unavailable(f"what the bucket {self._bucket.url} has as {digest} is damaged")
             self._keep(digest, content)
-        if not target.exists():
+        if not self.has(digest):
             raise NotFound(f"the artifacts in {self._folder} lack {digest}")
         return target
+
+    def has(self, digest: str) -> bool:
+        """Whether the folder has it."""
+        return self._target(digest).exists()
+
+    def lacking(self, transaction: Transaction) -> list[str]:
+        """Digests that reconstructions name and that are nowhere. Raises Unavailable."""
+        there = {file.name for file in self._files()}
+        if self._bucket is not None:
+            there.update(self._bucket.names(datetime.now(UTC) + timedelta(days=1)))
+        return sorted(set(transaction.scalars(select(ArtifactRow.sha256))) - there)
 
     def remove_unreferenced(self, transaction: Transaction, min_age: float = 3600.0) -> int:
         """Delete contents that no reconstruction has, and pieces of interrupted writes; how many.

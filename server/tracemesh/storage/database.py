@@ -6,11 +6,16 @@ from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import Engine, create_engine, event
 from sqlalchemy.engine import Connection, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
+
+from tracemesh.errors import ResourceError
 
 BUSY_TIMEOUT = 30
 """s that SQLite waits for another writer."""
@@ -49,16 +54,44 @@ class Database:
         with self.engine.connect().execution_options(writes=True) as connection, connection.begin():
             if connection.dialect.name == "postgresql":
                 connection.exec_driver_sql("SELECT pg_advisory_xact_lock(7262726564)")
-            config = Config()
-            config.set_main_option("script_location", "tracemesh.storage:migrations")
+            config = _migrations()
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
+
+    def versions(self) -> tuple[str | None, str | None]:
+        """The schema's version, none in an empty database, and the one that this program wants."""
+        with self.engine.connect() as connection:
+            present = MigrationContext.configure(connection).get_current_revision()
+        return present, ScriptDirectory.from_config(_migrations()).get_current_head()
+
+
+@contextmanager
+def database_faults_in_words() -> Iterator[None]:
+    """Turn what a database's driver raises into a ResourceError of one line."""
+    try:
+        yield
+    except SQLAlchemyError as error:
+        raise ResourceError(f"the database cannot be used: {fault_in_words(error)}") from None
+
+
+def fault_in_words(error: SQLAlchemyError) -> str:
+    """What the driver said, in one line."""
+    return str(getattr(error, "orig", None) or error).splitlines()[0]
+
+
+def _migrations() -> Config:
+    config = Config()
+    config.set_main_option("script_location", "tracemesh.storage:migrations")
+    return config
 
 
 def _engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
-        return create_engine(parsed, pool_pre_ping=True)
+        try:
+            return create_engine(parsed, pool_pre_ping=True)
+        except ImportError:
+            raise ResourceError("PostgreSQL wants another package: pip install 'tracemesh[postgres]'") from None
     if parsed.database:
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
     engine = create_engine(parsed, connect_args={"timeout": BUSY_TIMEOUT, "check_same_thread": False})
