@@ -49,20 +49,20 @@ class Database:
         """Close all connections."""
         self.engine.dispose()
 
-    def migrate(self) -> None:
-        """Bring the schema up to date: wholly or, when it fails, not at all."""
+    def migrate(self, revision: str = "head") -> None:
+        """Bring the schema up to this revision: wholly or, when it fails, not at all."""
         with self.engine.connect().execution_options(writes=True) as connection, connection.begin():
             if connection.dialect.name == "postgresql":
                 connection.exec_driver_sql("SELECT pg_advisory_xact_lock(7262726564)")
-            config = _migrations()
+            config = migrations()
             config.attributes["connection"] = connection
-            command.upgrade(config, "head")
+            command.upgrade(config, revision)
 
     def versions(self) -> tuple[str | None, str | None]:
         """The schema's version, none in an empty database, and the one that this program wants."""
         with self.engine.connect() as connection:
             present = MigrationContext.configure(connection).get_current_revision()
-        return present, ScriptDirectory.from_config(_migrations()).get_current_head()
+        return present, ScriptDirectory.from_config(migrations()).get_current_head()
 
 
 @contextmanager
@@ -79,7 +79,8 @@ def fault_in_words(error: SQLAlchemyError) -> str:
     return str(getattr(error, "orig", None) or error).splitlines()[0]
 
 
-def _migrations() -> Config:
+def migrations() -> Config:
+    """Where alembic finds the schema's history."""
     config = Config()
     config.set_main_option("script_location", "tracemesh.storage:migrations")
     return config

@@ -1,0 +1,67 @@
+"""A database of any earlier schema is brought up to date, and every row in it is kept."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+from alembic.script import ScriptDirectory
+from sqlalchemy import Column, Connection, MetaData, select
+
+from tracemesh.storage.database import Database, migrations
+
+REVISIONS = [script.revision for script in ScriptDirectory.from_config(migrations()).walk_revisions()]
+VALUES: dict[type, Any] = {str: "x", int: 3, float: 0.5, bool: True, bytes: b"{}", object: {"a": 1}}
+
+Rows = dict[str, dict[str, Any]]
+
+
+def value(column: Column[Any], rows: Rows) -> Any:
+    """Something that fits; what refers to another table refers to its row."""
+    for key in column.foreign_keys:
+        return rows[key.column.table.name][key.column.name]
+    kind = column.type.python_type
+    return datetime(2026, 1, 2, tzinfo=UTC) if kind is datetime else VALUES[kind]
+
+
+def fill(connection: Connection) -> Rows:
+    """One row in every table, every column of it."""
+    schema, rows = reflected(connection), Rows()
+    for table in schema.sorted_tables:
+        if table.name != "alembic_version":
+            rows[table.name] = {column.name: value(column, rows) for column in table.columns}
+            connection.execute(table.insert(), rows[table.name])
+    return rows
+
+
+def reflected(connection: Connection) -> MetaData:
+    schema = MetaData()
+    schema.reflect(connection)
+    return schema
+
+
+@pytest.fixture
+def databases() -> Iterator[Callable[[str], Database]]:
+    """Open databases; all are closed after the test."""
+    with ExitStack() as stack:
+        yield lambda url: stack.enter_context(closing(Database(url)))
+
+
+@pytest.mark.parametrize("revision", REVISIONS)
+def test_every_row_of_an_earlier_schema_is_kept(
+    revision: str, database_url: str, databases: Callable[[str], Database]
+) -> None:
+    database = databases(database_url)
+    database.migrate(revision)
+    with database.engine.begin() as connection:
+        rows = fill(connection)
+    assert {"sessions", "recordings", "messages", "curves", "marks", "reconstructions", "artifacts"} <= set(rows)
+    database.migrate()
+    with database.engine.begin() as connection:
+        schema = reflected(connection)
+        for name, row in rows.items():
+            kept = [column for column in schema.tables[name].columns if column.name in row]
+            (found,) = connection.execute(select(*kept)).mappings()
+            told = {column: v.replace(tzinfo=UTC) if isinstance(v, datetime) else v for column, v in found.items()}
+            assert told == {column.name: row[column.name] for column in kept}, name
