@@ -81,7 +81,7 @@ def reconstruct(
     found = _find_nodes(scan, report) if parameters.infer_nodes else None
     scan = give_lengths(_marked(scan, found), lengths or {})
     curves = _network(scan, parameters, _part(report, 0.0, NETWORK_SHARE))
-    made = {"generator": _generator(), "lengths": _lengths_report(scan)}
+    made = {"generator": _generator(), "lengths": _lengths_report(scan), "calibrations": _calibrations_report(scan)}
     nodes = {"nodes": _nodes_report(found)} if found else {}
     result = Reconstruction(curves.network, None, {**made, **nodes, "network": curves.report}, found)
     if parameters.surface:
@@ -131,6 +131,15 @@ def _lengths_report(scan: Scan) -> dict[str, object]:
     arbitrary = len(timed) == len(scan.curves) and not given
     warning = f"no length was measured: the size is that of a hand that moves at {NOMINAL_SPEED:g} m/s"
     return {"timed_curves": timed, "curves_with_given_lengths": given, "warnings": [warning] if arbitrary else []}
+
+
+def _calibrations_report(scan: Scan) -> list[dict[str, object]]:
+    """Which calibrations were applied to which curves, counted from 0; all others are as their devices sent them."""
+    names = dict.fromkeys(c.calibration for c in scan.curves if c.calibration)
+    return [
+        {"calibration": name, "curves": [i for i, c in enumerate(scan.curves) if c.calibration == name]}
+        for name in names
+    ]
 
 
 def _network(scan: Scan, parameters: ReconstructionParameters, progress: Progress) -> NetworkResult:

@@ -8,6 +8,117 @@ export interface Ack {
   type: "ack";
 }
 /**
+ * One calibration of one device.
+ */
+export interface Calibration {
+  accelerometer: SensorCorrection | null;
+  /**
+   * [w, x, y, z]: turns the magnetometer's corrected vectors into the accelerometer's axes
+   *
+   * @minItems 4
+   * @maxItems 4
+   */
+  alignment: [number, number, number, number];
+  /**
+   * of the wheel, m
+   */
+  circumference: number | null;
+  device: string;
+  /**
+   * rad, of the field below the horizontal, as corrected
+   */
+  dip: number | null;
+  dip_spread_after: number | null;
+  /**
+   * rad, standard deviation over all poses
+   */
+  dip_spread_before: number | null;
+  format: "tracemesh-calibration";
+  made: string;
+  magnetometer: SensorCorrection | null;
+  /**
+   * where, for people
+   */
+  place: string;
+  /**
+   * which readings it was made of, for people
+   */
+  source: string;
+  /**
+   * none: no server has it yet
+   */
+  version: number | null;
+}
+/**
+ * Right vector = matrix (measured - offset), both in the sensor's own unit.
+ */
+export interface SensorCorrection {
+  /**
+   * part of all directions in which it was measured
+   */
+  coverage: number;
+  /**
+   * rows; determinant about 1
+   *
+   * @minItems 3
+   * @maxItems 3
+   */
+  matrix: [[number, number, number], [number, number, number], [number, number, number]];
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  offset: [number, number, number];
+  spread_after: number;
+  /**
+   * standard deviation of the vectors' lengths over their mean
+   */
+  spread_before: number;
+}
+/**
+ * POST /devices/{device}/calibrations: one that is ready, or readings of which the server makes one.
+ */
+export interface CalibrationCreate {
+  calibration: Calibration | null;
+  readings: CalibrationReadings | null;
+}
+/**
+ * What a calibration is made of: poses all around, faces that the device lay on, a straight run; any of the first
+ * and the last.
+ */
+export interface CalibrationReadings {
+  /**
+   * as measured, up at rest
+   */
+  acceleration: [number, number, number][];
+  /**
+   * accelerations at rest on faces of the case, one for each
+   */
+  faces: [number, number, number][];
+  /**
+   * none: now
+   */
+  made: string | null;
+  /**
+   * as measured, one for each of these
+   */
+  magnetic: [number, number, number][];
+  place: string;
+  run: StraightRun | null;
+  source: string;
+}
+/**
+ * A straight run whose length a ruler measured.
+ */
+export interface StraightRun {
+  /**
+   * m
+   */
+  length: number;
+  ticks: [number, number][];
+  ticks_per_turn: number;
+}
+/**
  * One scanned curve of a session.
  */
 export interface Curve {
@@ -154,6 +265,23 @@ export interface Hello {
   session: string | null;
   type: "hello";
   versions: number[];
+}
+/**
+ * A device that has sent something to this server.
+ */
+export interface KnownDevice {
+  /**
+   * how many of its calibrations are stored
+   */
+  calibrations: number;
+  first_seen: string;
+  id: string;
+  kind: string;
+  /**
+   * when it last began or went on with a recording, or was calibrated
+   */
+  last_seen: string;
+  name: string;
 }
 /**
  * One curve as drawn: dead reckoning while it is scanned, consistent once the network was solved.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from tracemesh.geometry.nodes.node_inference import InferredNodes
     from tracemesh.geometry.sensing.orientation import ReferenceField
     from tracemesh.pipeline import Reconstruction
+    from tracemesh.wire.calibration import Calibration
 
 
 def add_reconstruct(commands: Commands) -> None:
@@ -56,6 +58,9 @@ def add_reconstruct(commands: Commands) -> None:
         "--still", metavar="STILL.ndjson", help="the field that a recording of the device at rest measured"
     )
     parser.add_argument("--date", type=iso_date, metavar="YYYY-MM-DD", help="of the scan, with --place (default today)")
+    parser.add_argument(
+        "--calibration", metavar="CAL.json", help="of the device, as tracemesh-bridge calibrate writes it"
+    )
     parser.add_argument("--infer-nodes", action="store_true", help="find the nodes that are not marked")
     parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
     parser.add_argument("--no-surface", action="store_true", help="stop after the network; MESH is then not written")
@@ -91,6 +96,7 @@ def _add_mesh_output(parser: argparse.ArgumentParser) -> None:
 
 
 def _reconstruct(chosen: argparse.Namespace) -> int:
+    from tracemesh.formats.calibrations import read_calibration
     from tracemesh.formats.scans import read_scan
     from tracemesh.pipeline import reconstruct
 
@@ -105,7 +111,8 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
         surface=not chosen.no_surface,
     )
     check_writable(chosen.output, chosen.network, chosen.report)
-    scan = read_scan(read_text(chosen.input), chosen.input, _field(chosen))
+    calibration = read_calibration(read_text(chosen.calibration), chosen.calibration) if chosen.calibration else None
+    scan = read_scan(read_text(chosen.input), chosen.input, _field(chosen, calibration), calibration)
     with ProgressLine() as progress:
         result = reconstruct(scan, parameters, progress, dict(chosen.length))
     if result.nodes:
@@ -114,8 +121,8 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
     return 0
 
 
-def _field(chosen: argparse.Namespace) -> ReferenceField | None:
-    """The magnetic field that the person names, if any."""
+def _field(chosen: argparse.Namespace, calibration: Calibration | None) -> ReferenceField | None:
+    """The magnetic field that the person names, if any; what a device at rest measured is calibrated, too."""
     from tracemesh.formats.recordings import read_recording
     from tracemesh.formats.references import measured_reference
     from tracemesh.geometry.sensing.magnetic_field import field_at
@@ -126,7 +133,8 @@ def _field(chosen: argparse.Namespace) -> ReferenceField | None:
         latitude, longitude = chosen.place
         return field_at(latitude, longitude, chosen.date or date.today())
     if chosen.still:
-        return measured_reference(read_recording(read_text(chosen.still).split("\n"), chosen.still))
+        still = read_recording(read_text(chosen.still).split("\n"), chosen.still)
+        return measured_reference(replace(still, calibration=calibration))
     return None
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from tracemesh.errors import InputError, ScanError
+from tracemesh.formats.calibrations import calibrate
 from tracemesh.geometry.curves.closed_curves import from_first_node
 from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
@@ -23,6 +24,7 @@ from tracemesh.geometry.simulated.simulation import (
     WHEEL_CIRCUMFERENCE,
     SimulatedCurve,
 )
+from tracemesh.wire.calibration import Calibration
 from tracemesh.wire.device import (
     MAX_SAMPLES,
     CurveEnd,
@@ -40,10 +42,11 @@ from tracemesh.wire.device import (
 
 @dataclass(frozen=True)
 class Recording:
-    """hello, and the numbered messages after it in their order."""
+    """hello, and the numbered messages after it in their order; and the calibration that was chosen for it, if any."""
 
     hello: Hello
     messages: Sequence[Recorded]
+    calibration: Calibration | None = None
 
 
 def read_recording(lines: Iterable[str], source: str = "") -> Recording:
@@ -85,7 +88,7 @@ def scan_from_recordings(recordings: Sequence[Recording]) -> Scan:
     curves: list[CurveScan] = []
     for recording in recordings:
         for raw in _raw_curves(recording, len(curves)):
-            curves.append(_named(f"curve {len(curves) + 1}", raw, recording.hello.device))
+            curves.append(_named(f"curve {len(curves) + 1}", raw, recording))
     return Scan(tuple(curves))
 
 
@@ -208,15 +211,16 @@ def _raw_curves(recording: Recording, before: int) -> Iterator[_RawCurve]:
     return (c for c in curves.values() if c.count and not c.discarded)
 
 
-def _named(name: str, raw: _RawCurve, device: Device) -> CurveScan:
+def _named(name: str, raw: _RawCurve, recording: Recording) -> CurveScan:
     try:
-        return _curve(raw, device)
+        return _curve(raw, recording)
     except (ScanError, InputError) as error:
         raise type(error)(f"{name}: {error}") from None
 
 
-def _curve(raw: _RawCurve, device: Device) -> CurveScan:
-    columns = _joined(raw.blocks)
+def _curve(raw: _RawCurve, recording: Recording) -> CurveScan:
+    right = calibrate(_joined(raw.blocks), recording.hello.device, recording.calibration)
+    columns, device = right.columns, right.device
     samples, ids = _marks(raw)
     tangent, normal = _orientation(columns, device)
     distance = _distance(columns, device, tangent, normal, samples)
@@ -224,6 +228,7 @@ def _curve(raw: _RawCurve, device: Device) -> CurveScan:
         distance, tangent, normal, samples, ids, raw.boundary, raw.closed,
         columns.get("acceleration"), columns.get("magnetic"), columns.get("time"),
         timed=columns.keys().isdisjoint({"distance", "ticks"}),
+        calibration=recording.calibration.label if recording.calibration and right.used else "",
     )  # fmt: skip
     return from_first_node(scan) if raw.closed else scan
 

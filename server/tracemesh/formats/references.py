@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tracemesh.errors import InputError
+from tracemesh.formats.calibrations import calibrate
 from tracemesh.formats.recordings import Recording
 from tracemesh.geometry.sensing.magnetic_field import field_at_rest
 from tracemesh.geometry.sensing.orientation import ReferenceField
@@ -28,9 +29,12 @@ def measured_reference(recording: Recording) -> ReferenceField:
     blocks = [m for m in recording.messages if isinstance(m, Samples) and m.acceleration and m.magnetic]
     if not blocks:
         raise InputError(f"recording {recording.hello.recording}: wanted samples with acceleration and magnetic")
-    acceleration = np.concatenate([np.array(block.acceleration, float) for block in blocks])
-    magnetic = np.concatenate([np.array(block.magnetic, float) for block in blocks])
-    return field_at_rest(acceleration, magnetic)
+    columns = {
+        name: np.concatenate([np.array(getattr(block, name), float) for block in blocks])
+        for name in ("acceleration", "magnetic")
+    }
+    right = calibrate(columns, recording.hello.device, recording.calibration).columns
+    return field_at_rest(right["acceleration"], right["magnetic"])
 
 
 def _needs_reference(block: Samples) -> bool:

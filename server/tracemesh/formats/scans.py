@@ -1,23 +1,33 @@
 """Scans from files of either kind: a rawnet or a recording, told apart by their first character."""
 
+from dataclasses import replace
+
 from tracemesh.errors import InputError
 from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import read_recording, scan_from_recordings
 from tracemesh.formats.references import with_reference
 from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.sensing.orientation import ReferenceField
+from tracemesh.wire.calibration import Calibration
 
 
-def read_scan(text: str, source: str = "", field: ReferenceField | None = None) -> Scan:
+def read_scan(
+    text: str, source: str = "", field: ReferenceField | None = None, calibration: Calibration | None = None
+) -> Scan:
     """Scan in a rawnet or in a recording, whose vectors are compared with `field` instead of what its hello names.
 
-    Raises InputError with `source` and line, and where a field is given that changes nothing.
+    calibration: of the device that made the recording. Raises InputError with `source` and line, and where a field or a
+    calibration is given that changes nothing.
     """
     if is_recording(text):
-        recording = read_recording(text.split("\n"), source)
-        return scan_from_recordings([with_reference(recording, field) if field else recording])
-    if field:
-        raise InputError(f"{source}: wanted a recording, whose vectors a magnetic field can explain, got a rawnet")
+        recording = replace(read_recording(text.split("\n"), source), calibration=calibration)
+        scan = scan_from_recordings([with_reference(recording, field) if field else recording])
+        if calibration and not any(curve.calibration for curve in scan.curves):
+            raise InputError(f"{source}: its device sent orientations and lengths: {calibration.label} changes nothing")
+        return scan
+    if field or calibration:
+        what = "a magnetic field can explain" if field else "a calibration can correct"
+        raise InputError(f"{source}: wanted a recording, whose vectors {what}, got a rawnet")
     return read_rawnet(text, source)
 
 

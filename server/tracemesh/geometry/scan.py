@@ -28,6 +28,7 @@ class CurveScan:
     time: (n,) s or None, device clock.
     timed: the distance was made from durations; between two nodes it is right up to a factor that is not known.
     lengths: (s,) m or None, of the segments between its nodes, in order, where somebody measured them; NaN elsewhere.
+    calibration: what people call the calibration with which it was made of a device's readings; empty: none.
     """
 
     distance: Floats
@@ -42,6 +43,7 @@ class CurveScan:
     time: Floats | None = None
     timed: bool = False
     lengths: Floats | None = None
+    calibration: str = ""
 
 
 @dataclass(frozen=True)
