@@ -12,7 +12,7 @@ COPY pyproject.toml README.md LICENSE CHANGELOG.md ./
 COPY server server
 COPY device_bridge device_bridge
 COPY --from=web /src/server/tracemesh/web server/tracemesh/web
-RUN python -m venv /opt/tracemesh && /opt/tracemesh/bin/pip install --no-cache-dir '.[postgres]'
+RUN python -m venv /opt/tracemesh && /opt/tracemesh/bin/pip install --no-cache-dir '.[cluster,postgres,s3]'
 
 FROM python:3.12-slim-bookworm
 RUN install --directory --owner=10001 --group=10001 /data
