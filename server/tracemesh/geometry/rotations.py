@@ -11,7 +11,7 @@ _SMALL = 1e-4  # rad; below it the Taylor series of the coefficients is exact to
 def hat(vector: Floats) -> Floats:
     """Cross-product matrices (..., 3, 3) of vectors (..., 3)."""
     matrix = np.zeros((*vector.shape, 3))
-    x, y, z = np.moveaxis(vector, -1, 0)
+    x, y, z = (vector[..., i] for i in range(3))
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
     matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
     return matrix
@@ -28,21 +28,16 @@ def skew_vector(matrix: Floats) -> Floats:
 
 
 def exp(vector: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues)."""
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    a = np.where(angle < _SMALL, 1.0, angle)
-    first = np.where(angle < _SMALL, 1 - angle**2 / 6, np.sin(a) / a)
-    second = np.where(angle < _SMALL, 0.5 - angle**2 / 24, 2 * (np.sin(a / 2) / a) ** 2)
-    cross = hat(vector)
-    result: Floats = np.eye(3) + first * cross + second * (cross @ cross)
-    return result
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
+    half = lengths(vector)[..., None] / 2
+    return quaternion_to_matrix(np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vector], axis=-1))
 
 
 def log(matrix: Floats) -> Floats:
     """Rotation vectors (..., 3), rad, |v| <= pi, of rotation matrices (..., 3, 3)."""
     q = matrix_to_quaternion(matrix)
     q = np.where(q[..., :1] < 0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1)
+    sine = lengths(q[..., 1:])
     half = np.arctan2(sine, q[..., 0])
     factor = np.where(sine < _SMALL, 2 / np.maximum(q[..., 0], 0.5), 2 * half / np.maximum(sine, _SMALL))
     result: Floats = factor[..., None] * q[..., 1:]
@@ -51,7 +46,7 @@ def log(matrix: Floats) -> Floats:
 
 def quaternion_to_matrix(quaternion: Floats) -> Floats:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), w first."""
-    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    w, x, y, z = (quaternion[..., i] for i in range(4))
     matrix = np.empty((*quaternion.shape[:-1], 3, 3))
     matrix[..., 0, 0] = 1 - 2 * (y * y + z * z)
     matrix[..., 1, 1] = 1 - 2 * (x * x + z * z)
@@ -67,17 +62,15 @@ def matrix_to_quaternion(matrix: Floats) -> Floats:
 
     The largest of the four components is computed first, so that none is divided by a small number.
     """
-    diagonal = np.stack([matrix[..., i, i] for i in range(3)], axis=-1)
-    trace = diagonal.sum(axis=-1)
-    squares = np.concatenate([(1 + trace)[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)  # 4 q_i^2
-    outer = np.empty((*matrix.shape[:-2], 4, 4))  # 4 q_i q_j
-    outer[..., 0, 1:] = outer[..., 1:, 0] = skew_vector(matrix)
-    outer[..., 1:, 1:] = matrix + np.swapaxes(matrix, -1, -2)
-    for i in range(4):
-        outer[..., i, i] = squares[..., i]
-    row = np.take_along_axis(outer, squares.argmax(axis=-1)[..., None, None], axis=-2)[..., 0, :]
-    result: Floats = row / np.linalg.norm(row, axis=-1, keepdims=True)
-    return result
+    x, y, z = (matrix[..., i, i] for i in range(3))
+    outer = np.empty((4, 4, *matrix.shape[:-2]))  # 4 q_i q_j
+    outer[0, 0], outer[1, 1], outer[2, 2], outer[3, 3] = 1 + x + y + z, 1 + x - y - z, 1 - x + y - z, 1 - x - y + z
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        outer[0, k + 1] = outer[k + 1, 0] = matrix[..., j, i] - matrix[..., i, j]
+        outer[i + 1, j + 1] = outer[j + 1, i + 1] = matrix[..., i, j] + matrix[..., j, i]
+    largest = np.stack([outer[i, i] for i in range(4)]).argmax(axis=0)
+    row = np.take_along_axis(outer, largest[None, None], axis=0)[0]
+    return normalized(np.ascontiguousarray(np.moveaxis(row, 0, -1)))
 
 
 def align_signs(quaternion: Floats) -> Floats:
@@ -90,9 +83,15 @@ def align_signs(quaternion: Floats) -> Floats:
     return result
 
 
+def lengths(vector: Floats) -> Floats:
+    """Euclidean lengths (...) of vectors (..., n)."""
+    result: Floats = np.sqrt(np.einsum("...i,...i->...", vector, vector))
+    return result
+
+
 def normalized(vector: Floats) -> Floats:
     """Unit vectors (..., n) along vectors (..., n) that are not zero."""
-    result: Floats = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+    result: Floats = vector / lengths(vector)[..., None]
     return result
 
 
@@ -102,17 +101,17 @@ def darboux_frames(tangent: Floats, normal: Floats) -> Floats:
     The normal is kept because a device's tangent may be the chord to its next sample, which leaves the tangent plane.
     """
     n = normalized(normal)
-    t = normalized(tangent - np.sum(tangent * n, axis=-1, keepdims=True) * n)
+    t = normalized(tangent - np.einsum("...i,...i->...", tangent, n)[..., None] * n)
     return np.stack([t, n, np.cross(t, n)], axis=-1)
 
 
 def quaternion_difference(to: Floats, origin: Floats) -> Floats:
     """Rotation vectors (..., 3), rad, of to origin^-1, of unit quaternions (..., 4) less than half a turn apart."""
-    w = np.sum(to * origin, axis=-1, keepdims=True)
+    w = np.einsum("...i,...i->...", to, origin)[..., None]
     u, v = to[..., 1:], origin[..., 1:]
     vector = origin[..., :1] * u - to[..., :1] * v - np.cross(u, v)
     vector = np.where(w < 0, -vector, vector)
-    sine = np.linalg.norm(vector, axis=-1, keepdims=True)
+    sine = lengths(vector)[..., None]
     angle = 2 * np.arctan2(sine, np.abs(w))
     result: Floats = np.where(sine < _SMALL, 2.0, angle / np.maximum(sine, _SMALL)) * vector
     return result

@@ -64,7 +64,8 @@ class _Estimation:
     def _prior(self) -> Floats:
         c, m = self._c, self._m
         precision = np.diag(np.concatenate([np.zeros(3 * c), np.full(c, 1 / self._scale), np.full(m, 1 / self._shift)]))
-        precision[: 3 * c, : 3 * c] = np.kron(np.eye(c), np.linalg.inv(self._rotation))
+        own = 3 * np.arange(c)[:, None] + np.arange(3)
+        precision[own[:, :, None], own[:, None, :]] = np.linalg.inv(self._rotation)
         return precision
 
     def _system(self) -> tuple[Floats, Floats]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.rotations import align_signs, darboux_frames, matrix_to_quaternion, normalized
+from tracemesh.geometry.rotations import align_signs, darboux_frames, lengths, matrix_to_quaternion, normalized
 from tracemesh.geometry.scan import CurveScan, curve_name
 from tracemesh.geometry.sensing.orientation import angles_between
 
@@ -54,14 +54,14 @@ def _check(curve: CurveScan, name: str) -> None:
         finite = np.isfinite(array).all(axis=1)
         if not finite.all():
             raise ScanError(f"{name}: the {what} of sample {int((~finite).argmax()) + 1} is not finite")
-        short = np.linalg.norm(array, axis=1) < 1e-9
+        short = lengths(array) < 1e-9
         if short.any():
             raise ScanError(f"{name}: the {what} of sample {int(short.argmax()) + 1} is zero")
     if not np.isfinite(curve.distance).all():
         raise ScanError(
             f"{name}: the distance of sample {int((~np.isfinite(curve.distance)).argmax()) + 1} is not finite"
         )
-    along = np.linalg.norm(np.cross(normalized(curve.tangent), normalized(curve.normal)), axis=1) < 1e-6
+    along = lengths(np.cross(normalized(curve.tangent), normalized(curve.normal))) < 1e-6
     if along.any():
         raise ScanError(f"{name}: tangent and normal of sample {int(along.argmax()) + 1} are parallel")
     _check_marks(curve, name)
@@ -104,15 +104,15 @@ def _vector_outliers(acceleration: Floats, magnetic: Floats) -> Bools:
 
 
 def _windowed_distances(frames: Floats) -> Floats:
-    """Distances (n, 5, 5) between the tangents and normals of each sample's window: itself and two on each side."""
+    """Distances (5, 5, n) between the tangents and normals of each sample's window: itself and two on each side."""
     n, half = len(frames), _WINDOW // 2
     x = frames[:, :, :2].reshape(n, 6)
     x = np.concatenate([x[2 * half : half : -1], x, x[-half - 2 : -2 * half - 2 : -1]])  # one-sided at the ends
-    distances = np.zeros((n, _WINDOW, _WINDOW))
+    distances = np.zeros((_WINDOW, _WINDOW, n))
     for lag in range(1, _WINDOW):
-        apart = np.linalg.norm(x[lag:] - x[:-lag], axis=1)
+        apart = lengths(x[lag:] - x[:-lag])
         for a in range(_WINDOW - lag):
-            distances[:, a, a + lag] = distances[:, a + lag, a] = apart[a : a + n]
+            distances[a, a + lag] = distances[a + lag, a] = apart[a : a + n]
     return distances
 
 
@@ -122,15 +122,17 @@ def _frame_outliers(frames: Floats) -> Bools:
     Both the curve's own noise and the local change set the scale: a sharp bend is no outlier. Distances of matrices
     depend neither on the world's axes nor on the signs that quaternions would have to carry across an outlier.
     """
-    n = len(frames)
+    n, middle = len(frames), _WINDOW // 2
     if n < _WINDOW:
         return np.zeros(n, bool)
     distances = _windowed_distances(frames)
-    medoid = distances.sum(axis=2).argmin(axis=1)
-    to_medoid = distances[np.arange(n), medoid]
-    deviation, local = to_medoid[:, _WINDOW // 2], np.sort(to_medoid, axis=1)[:, _WINDOW // 2]
-    scale = _robust_scale(distances[:, _WINDOW // 2, _WINDOW // 2 + 1])
-    result: Bools = (deviation > _GATE * scale + 1e-9) & (deviation > _GATE * local)
+    medoid = distances.sum(axis=1).argmin(axis=0)
+    deviation = distances[medoid, middle, np.arange(n)]
+    scale = _robust_scale(distances[middle, middle + 1])
+    result: Bools = deviation > _GATE * scale + 1e-9
+    far = np.flatnonzero(result)  # the local change is looked at where it matters only
+    local = np.partition(distances[medoid[far], :, far], middle, axis=1)[:, middle]
+    result[far] = deviation[far] > _GATE * local
     return result
 
 

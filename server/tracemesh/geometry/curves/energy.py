@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracemesh.geometry.curves.stencil import Pattern, Stencil
-from tracemesh.geometry.rotations import hat, skew_vector
+from tracemesh.geometry.rotations import exp, hat
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,13 +30,29 @@ class Weights:
     bend: float
 
 
+def _entries_first(matrix: Floats) -> Floats:
+    """Matrices (k, 3, 3) as (3, 3, k): every entry of all of them is contiguous, which makes all below fast."""
+    return np.ascontiguousarray(matrix.transpose(1, 2, 0))
+
+
 def _transposed(matrix: Floats) -> Floats:
-    return np.swapaxes(matrix, -1, -2)
+    return np.swapaxes(matrix, 0, 1)
+
+
+def _product(left: Floats, right: Floats) -> Floats:
+    """Products L^T R (3, 3, k) of matrices (3, 3, k)."""
+    result: Floats = np.einsum("lik,ljk->ijk", left, right)
+    return result
 
 
 def _trace(matrix: Floats) -> Floats:
-    result: Floats = matrix[..., 0, 0] + matrix[..., 1, 1] + matrix[..., 2, 2]
+    result: Floats = matrix[0, 0] + matrix[1, 1] + matrix[2, 2]
     return result
+
+
+def _skew_vector(matrix: Floats) -> Floats:
+    """Vectors (3, k) with hat(v) = M - M^T for matrices (3, 3, k)."""
+    return np.stack([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
 
 
 def _curl(matrix: Floats) -> Floats:
@@ -44,13 +60,13 @@ def _curl(matrix: Floats) -> Floats:
     result = -matrix
     trace = _trace(matrix)
     for i in range(3):
-        result[..., i, i] += trace
+        result[i, i] += trace
     return result
 
 
 def _apply(matrix: Floats, vector: Floats) -> Floats:
-    """Products (k, 3) of matrices (k, 3, 3) and vectors (k, 3)."""
-    result: Floats = np.einsum("kij,kj->ki", matrix, vector)
+    """Products (3, k) of matrices (3, 3, k) and vectors (3, k)."""
+    result: Floats = np.einsum("ijk,jk->ik", matrix, vector)
     return result
 
 
@@ -76,72 +92,78 @@ class EnergyPoint:
         trust: Floats | float = 1.0,
     ) -> None:
         """Find the value; softening: factor on the stiffness of the nodes. trust: (u,) factors on the data's weight."""
-        self.frames, self._data = frames, trust * stencil.data
+        self._x, self._data = _entries_first(frames), trust * stencil.data
         self._stiffness = softening * stencil.stiffness
         self._s, self._stretch, self._bend = stencil, weights.stretch**2, weights.bend**4
-        s, n = stencil, frames[:, :, 1]
-        self._fit = _transposed(data) @ frames
-        self._turn = _transposed(frames[s.left]) @ frames[s.right]
-        self._rate = skew_vector(self._turn)  # 2 vee(skew), of which bends are differences
-        self._bends = 0.5 * (self._rate[s.edge_out] / s.h_out[:, None] - self._rate[s.edge_in] / s.h_in[:, None])
+        s, n = stencil, self._x[:, 1]
+        self._fit = _product(_entries_first(data), self._x)
+        self._turn = _product(self._x.take(s.left, axis=2), self._x.take(s.right, axis=2))
+        self._rate = _skew_vector(self._turn)  # 2 vee(skew), of which bends are differences
+        self._bends = 0.5 * (self._rate[:, s.edge_out] / s.h_out - self._rate[:, s.edge_in] / s.h_in)
         self._bend_weight = self._bend * 8 / (s.h_in + s.h_out)
-        self._split = n[s.pair[:, 0]] - n[s.pair[:, 1]]
+        self._split = n[:, s.pair[:, 0]] - n[:, s.pair[:, 1]]
         self.value = float(
-            2 * np.sum(self._data * (3 - _trace(self._fit)))
+            2 * self._data @ (3 - _trace(self._fit))
             + 2 * self._stretch * np.sum((3 - _trace(self._turn)) / s.h)
-            + 0.5 * np.sum(self._bend_weight * np.sum(self._bends**2, axis=1))
+            + 0.5 * np.sum(self._bends**2 @ self._bend_weight)
             + self._stiffness * np.sum(self._split**2)
         )
+
+    @property
+    def frames(self) -> Floats:
+        """Where it is (u, 3, 3)."""
+        return self._x.transpose(2, 0, 1)
+
+    def moved(self, step: Floats) -> Floats:
+        """Frames (u, 3, 3) after a step (u, 3), rad."""
+        turned: Floats = np.einsum("ilk,ljk->ijk", self._x, _entries_first(exp(step)))
+        return turned.transpose(2, 0, 1)
 
     def gradient(self) -> Floats:
         """Derivative (u, 3) with respect to w in X exp(w)."""
         s = self._s
-        gradient: Floats = 2 * self._data[:, None] * skew_vector(self._fit)
-        force = (2 * self._stretch / s.h)[:, None] * self._rate
-        gradient[s.right] += force
-        gradient[s.left] -= force
+        gradient: Floats = 2 * self._data * _skew_vector(self._fit)
+        force = (2 * self._stretch / s.h) * self._rate
+        gradient[:, s.right] += force
+        gradient[:, s.left] -= force
         self._add_bends(gradient)
         for unknown, sign in zip(s.pair.T, (2.0, -2.0), strict=True):
-            torque = np.cross([0.0, 1.0, 0.0], _apply(_transposed(self.frames[unknown]), self._split))
-            np.add.at(gradient, unknown, sign * self._stiffness * torque)
-        return gradient
+            own = sign * self._stiffness * _apply(_transposed(self._x[:, :, unknown]), self._split)
+            gradient[0] += np.bincount(unknown, own[2], s.size)  # e_N x own
+            gradient[2] -= np.bincount(unknown, own[0], s.size)
+        return gradient.T
 
     def _add_bends(self, gradient: Floats) -> None:
         s = self._s
-        pull = (self._bend_weight / 2)[:, None] * self._bends
-        ahead, behind = pull / s.h_out[:, None], pull / s.h_in[:, None]
-        out, into = self._turn[s.edge_out], self._turn[s.edge_in]
-        along_out, along_in = _trace(out)[:, None] * ahead, _trace(into)[:, None] * behind
-        gradient[s.after] += along_out - _apply(out, ahead)
-        gradient[s.before] += along_in - _apply(_transposed(into), behind)
-        gradient[s.centre] -= along_out - _apply(_transposed(out), ahead) + along_in - _apply(into, behind)
+        pull = (self._bend_weight / 2) * self._bends
+        ahead, behind = pull / s.h_out, pull / s.h_in
+        out, into = self._turn.take(s.edge_out, axis=2), self._turn.take(s.edge_in, axis=2)
+        along_out, along_in = _trace(out) * ahead, _trace(into) * behind
+        gradient[:, s.after] += along_out - _apply(out, ahead)
+        gradient[:, s.before] += along_in - _apply(_transposed(into), behind)
+        gradient[:, s.centre] -= along_out - _apply(_transposed(out), ahead) + along_in - _apply(into, behind)
 
     def hessian_blocks(self) -> Floats:
-        """Blocks (k, 3, 3) of the Hessian at the places of `pattern_of`."""
+        """Blocks (3, 3, k) of the Hessian at the places of `pattern_of`."""
         s = self._s
         curl = _curl(self._fit)
-        diagonal = self._data[:, None, None] * (curl + _transposed(curl))
+        diagonal = self._data * (curl + _transposed(curl))
         curl = _curl(self._turn)
-        across = (-2 * self._stretch / s.h)[:, None, None] * _transposed(curl)
+        across = (-2 * self._stretch / s.h) * _transposed(curl)
         if self._stretch:
-            diagonal[s.left] -= (across + _transposed(across)) / 2
-            diagonal[s.right] -= (across + _transposed(across)) / 2
-        return np.concatenate([diagonal, across, self._bend_blocks(curl), self._node_blocks()])
+            diagonal[:, :, s.left] -= (across + _transposed(across)) / 2
+            diagonal[:, :, s.right] -= (across + _transposed(across)) / 2
+        return np.concatenate([diagonal, across, *self._bend_blocks(curl), *self._node_blocks()], axis=2)
 
-    def _bend_blocks(self, curl: Floats) -> Floats:
+    def _bend_blocks(self, curl: Floats) -> list[Floats]:
         """Blocks of J^T J for J, the derivative of the bends with respect to the unknowns before, at and after them."""
         s = self._s
         root = 0.5 * np.sqrt(self._bend_weight)
-        out = (root / s.h_out)[:, None, None] * curl[s.edge_out]
-        into = (root / s.h_in)[:, None, None] * curl[s.edge_in]
-        jacobian = [into, -out - _transposed(into), _transposed(out)]
-        blocks = np.empty((6, len(into), 3, 3))
-        for k, (i, j) in enumerate(combinations_with_replacement(range(3), 2)):
-            np.matmul(_transposed(jacobian[i]), jacobian[j], out=blocks[k])
-        return blocks.reshape(-1, 3, 3)
+        out, into = root / s.h_out * curl.take(s.edge_out, axis=2), root / s.h_in * curl.take(s.edge_in, axis=2)
+        jacobian = [into, -out - _transposed(into), np.ascontiguousarray(_transposed(out))]
+        return [_product(left, right) for left, right in combinations_with_replacement(jacobian, 2)]
 
-    def _node_blocks(self) -> Floats:
+    def _node_blocks(self) -> list[Floats]:
         (p, q), weight = self._s.pair.T, 2 * self._stiffness
-        j_p, j_q = -self.frames[p] @ _E_N, self.frames[q] @ _E_N
-        left = weight * _transposed(j_p)
-        return np.concatenate([left @ j_p, weight * _transposed(j_q) @ j_q, left @ j_q])
+        j_p, j_q = (np.einsum("ilk,lj->ijk", self._x[:, :, k], _E_N) for k in (p, q))
+        return [weight * _product(j_p, j_p), weight * _product(j_q, j_q), -weight * _product(j_p, j_q)]

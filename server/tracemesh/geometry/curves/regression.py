@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from tracemesh.geometry.curves.energy import EnergyPoint, Weights, pattern_of
 from tracemesh.geometry.curves.samples import Layout
 from tracemesh.geometry.curves.stencil import Stencil
-from tracemesh.geometry.rotations import exp
 
 Floats = NDArray[np.float64]
 
 _STEP = 1e-9  # rad; a smaller step ends the iteration
-_NEAR = 3e-3  # rad; after a smaller step the nodes get their full stiffness and the factorisation is kept
-_SOFTENING = 0.01  # of the nodes' stiffness while far away: stiff ones let frames move along narrow valleys only
+_NEAR = 1e-2  # rad; after a smaller step the nodes get their full stiffness
+_NEARER = 3e-3  # rad; after a smaller step the factorisation is kept
 _SLOW = 0.1  # a kept factorisation is renewed when steps shrink less than this
+_SOFTENING = 0.01  # of the nodes' stiffness while far away: stiff ones let frames move along narrow valleys only
 _TRIALS = 100
 _DAMPING = 1e-3  # of the Hessian's diagonal, once a step failed
 _ROUNDING = 1e-12  # relative; energies that differ less are the same
@@ -96,11 +96,11 @@ class RegressionSolver:
             if renew:
                 self._factorise(point, damping)
             step = -self._solved(point.gradient().ravel()).reshape(-1, 3)
-            moved = self._point(point.frames @ exp(step), data, weights, softening)
+            moved = self._point(point.moved(step), data, weights, softening)
             before, size = size, float(np.abs(step).max())
             if moved.value <= point.value + _ROUNDING * abs(point.value):
                 point, damping = moved, damping / 10 if damping > _DAMPING else 0.0
-                renew = not (size < _NEAR and (renew or size < _SLOW * before))
+                renew = not (size < _NEARER and (renew or size < _SLOW * before))
             else:
                 damping, renew = max(10 * damping, _DAMPING), True
             if size < least:

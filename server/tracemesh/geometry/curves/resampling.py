@@ -61,8 +61,10 @@ def _fit_weights(offset: Floats, row: Ints, rows: int) -> Floats:
     offset: (e,) distance from the place in widths; row: (e,) place, increasing.
     """
     gauss = np.exp(-0.5 * offset**2)
-    starts = np.searchsorted(row, np.arange(rows))
-    moments = np.stack([np.add.reduceat(gauss * offset**p, starts) for p in range(5)], axis=1)
+    moments, term = np.empty((rows, 5)), gauss
+    for power in range(5):
+        moments[:, power] = np.bincount(row, term, rows)
+        term = term * offset
     matrix = moments[:, np.add.outer(np.arange(3), np.arange(3))]
     matrix += _RIDGE * moments[:, :1, None] * np.diag([0.0, 1.0, 1.0])
     right = np.zeros((rows, 3, 1))

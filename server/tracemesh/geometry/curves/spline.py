@@ -45,7 +45,7 @@ class Offsets:
     def predicted(self, offset: Floats) -> Floats:
         """Offsets (n, 3) at rows, interpolated at the measured samples (m, 3)."""
         f = self.fraction[:, None]
-        result: Floats = (1 - f) * offset[self.row] + f * offset[self.row + 1]
+        result: Floats = (1 - f) * offset.take(self.row, axis=0) + f * offset.take(self.row + 1, axis=0)
         return result
 
 
@@ -65,6 +65,11 @@ def measured_offsets(curves: Sequence[PlacedCurve], samples: NetworkSamples) -> 
     return Offsets(value, row, fraction, weight)
 
 
+def _bands(count: int) -> Bands:
+    """Zeros in the order in memory that the solver wants."""
+    return np.zeros((3, count), order="F"), np.zeros((count, 3), order="F")
+
+
 class DevelopedSpline:
     """Smoothing splines over the rows of resampled frames, for changing data and weights."""
 
@@ -78,51 +83,51 @@ class DevelopedSpline:
         self._stretch, self._bend = self._stretching(), self._bending()
 
     def data_band(self, offsets: Offsets, weight: Floats) -> Bands:
-        """Normal matrix (3, n), upper banded, and right-hand side (n, 3) of measured offsets with weights (m,)."""
+        """Normal matrix (3, n), lower banded, and right-hand side (n, 3) of measured offsets with weights (m,)."""
         n, row, f = self._n, offsets.row, offsets.fraction
-        band = np.zeros((3, n))
-        band[2] = np.bincount(row, weight * (1 - f) ** 2, n) + np.bincount(row + 1, weight * f**2, n)
-        band[2] += _RIDGE * (np.bincount(self._edge, self._h, n) + np.bincount(self._edge + 1, self._h, n))
-        band[1] = np.bincount(row + 1, weight * f * (1 - f), n)
-        right = np.empty((n, 3))
+        band, right = _bands(n)
+        band[0] = np.bincount(row, weight * (1 - f) ** 2, n) + np.bincount(row + 1, weight * f**2, n)
+        band[0] += _RIDGE * (np.bincount(self._edge, self._h, n) + np.bincount(self._edge + 1, self._h, n))
+        band[1] = np.bincount(row, weight * f * (1 - f), n)
         for axis in range(3):
             value = weight * offsets.value[:, axis]
             right[:, axis] = np.bincount(row, value * (1 - f), n) + np.bincount(row + 1, value * f, n)
         return band, right
 
     def _stretching(self) -> Bands:
-        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the stretching term of weight 1."""
-        band, right, edge, h = np.zeros((3, self._n)), np.zeros((self._n, 3)), self._edge, self._h
-        band[2] = np.bincount(edge, 1 / h, self._n) + np.bincount(edge + 1, 1 / h, self._n)
-        band[1, edge + 1] = -1 / h
+        """Matrix (3, n), lower banded, and right-hand side (n, 3) of the stretching term of weight 1."""
+        (band, right), edge, h = _bands(self._n), self._edge, self._h
+        band[0] = np.bincount(edge, 1 / h, self._n) + np.bincount(edge + 1, 1 / h, self._n)
+        band[1, edge] = -1 / h
         right[edge] += self._rate
         right[edge + 1] -= self._rate
         return band, right
 
     def _bending(self) -> Bands:
-        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the bending term of weight 1."""
-        band, right = np.zeros((3, self._n)), np.zeros((self._n, 3))
+        """Matrix (3, n), lower banded, and right-hand side (n, 3) of the bending term of weight 1."""
+        band, right = _bands(self._n)
         inner = np.flatnonzero(np.diff(self._edge) == 1)
         centre, before, after = self._edge[inner] + 1, self._h[inner], self._h[inner + 1]
         weight, (a, b, c) = 2 / (before + after), (1 / before, -1 / before - 1 / after, 1 / after)
         bend = weight[:, None] * (self._rate[inner + 1] - self._rate[inner])
         for at, coefficient in ((centre - 1, a), (centre, b), (centre + 1, c)):
-            band[2, at] += weight * coefficient**2
+            band[0, at] += weight * coefficient**2
             right[at] -= coefficient[:, None] * bend
-        band[1, centre] += weight * a * b
-        band[1, centre + 1] += weight * b * c
-        band[0, centre + 1] += weight * a * c
+        band[1, centre - 1] += weight * a * b
+        band[1, centre] += weight * b * c
+        band[2, centre - 1] += weight * a * c
         return band, right
 
     def penalty_band(self, weights: Weights) -> Bands:
-        """Matrix (3, n), upper banded, and right-hand side (n, 3) of the stretching and bending terms."""
+        """Matrix (3, n), lower banded, and right-hand side (n, 3) of the stretching and bending terms."""
         stretch, bend = weights.stretch**2, weights.bend**4
         band, right = (stretch * s + bend * b for s, b in zip(self._stretch, self._bend, strict=True))
         return band, right
 
     def solve(self, data: Bands, penalty: Bands) -> Floats:
         """Offsets (n, 3), rad, of the smooth frames from the resampled ones."""
-        result: Floats = solveh_banded(data[0] + penalty[0], data[1] + penalty[1], check_finite=False)
+        matrix, right = data[0] + penalty[0], data[1] + penalty[1]
+        result: Floats = solveh_banded(matrix, right, True, True, lower=True, check_finite=False)
         return result
 
     def frames(self, offset: Floats) -> Floats:

@@ -69,7 +69,7 @@ class Pattern:
         block, j = np.divmod(np.arange(3 * len(keys)), 3)
         order = np.lexsort((block, j, column[block]))  # entries column by column, three rows of a block at a time
         block, j = block[order], j[order]
-        entry = (9 * block + j)[:, None] + 3 * np.arange(3)
+        entry = (j * len(keys) + block)[:, None] + 3 * len(keys) * np.arange(3)
         index = (3 * row[block])[:, None] + np.arange(3)
         upper = index <= (3 * column[block] + j)[:, None]
         self._entry = entry[upper]
@@ -79,8 +79,8 @@ class Pattern:
         self.diagonal: Ints = indptr[1:] - 1
 
     def entries(self, blocks: Floats) -> Floats:
-        """Entries of the pattern summed from blocks (k, 3, 3) in the order of construction; changes the blocks."""
+        """Entries of the pattern summed from blocks (3, 3, k) in the order of construction; changes the blocks."""
         if len(self._below):
-            blocks[self._below] = np.swapaxes(blocks[self._below], 1, 2)
-        sums = np.asarray(self._sum @ blocks.reshape(-1, 9))
-        return np.asarray(sums.ravel()[self._entry])
+            blocks[:, :, self._below] = np.swapaxes(blocks[:, :, self._below], 0, 1)
+        sums = np.concatenate([self._sum @ entry for entry in blocks.reshape(9, -1)])
+        return np.asarray(sums[self._entry])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tracemesh.geometry.curves.adjustment import Adjustment, Corrections
 from tracemesh.geometry.curves.samples import Layout
+from tracemesh.geometry.rotations import hat
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -19,6 +20,7 @@ _MOST, _FEWEST = 64, 16  # draws: a standard deviation is then known to 9 % and 
 _ROWS = 250  # at which draws are looked at; what they show is smooth between nodes
 _NUMBERS = 3_000_000  # to hold at once
 _SEED = 0
+_FLAT = 1e-6  # of the largest singular value: curves in a line can be turned about it without being moved
 
 
 def _share(layout: Layout, rows: Ints) -> Floats:
@@ -29,28 +31,30 @@ def _share(layout: Layout, rows: Ints) -> Floats:
 
 
 def _deviations(layout: Layout, rows: Ints, points: Floats, tangent: Floats, drawn: Corrections) -> Floats:
-    """Deviations (d, k, 3), m, at rows (k,) of points (n, 3) with unit tangents (n, 3), for d drawn corrections."""
+    """Deviations (k, 3, d), m, at rows (k,) of points (n, 3) with unit tangents (n, 3), for d drawn corrections."""
     segment, curve = layout.row_segment[rows], layout.curve[rows]
     first, last = layout.segment_rows[segment].T
     t = _share(layout, rows)[:, None]
     mark, (a, b) = layout.segments[segment], layout.segment_nodes[segment].T
-    before, after = (1 - t) * drawn.shift[:, mark, None], t * drawn.shift[:, mark + 1, None]
-    ends = (1 - t) * drawn.nodes[:, a] + t * drawn.nodes[:, b] - before * tangent[first] - after * tangent[last]
     bulge = points[rows] - (1 - t) * points[first] - t * points[last]
-    turned = np.cross(drawn.rotation[:, curve], bulge) + drawn.scale[:, curve, None] * bulge
-    result: Floats = ends + turned + (before + after) * tangent[rows]
+    before, after = (1 - t) * (tangent[rows] - tangent[first]), t * (tangent[rows] - tangent[last])
+    effect = np.concatenate([-hat(bulge), np.stack([bulge, before, after], axis=2)], axis=2)
+    nodes, rotation, scale, shift = (np.moveaxis(part, 0, -1) for part in vars(drawn).values())
+    single = np.stack([scale[curve], shift[mark], shift[mark + 1]], axis=1)
+    ends = (1 - t)[:, :, None] * nodes[a] + t[:, :, None] * nodes[b]
+    result: Floats = ends + effect @ np.concatenate([rotation[curve], single], axis=1)
     return result
 
 
 def _without_motion(deviations: Floats, points: Floats) -> Floats:
-    """Deviations (k, n, 3) less the translation and the small rotation of the whole that are nearest to each."""
+    """Deviations (k, 3, d) less the translation and the small rotation of the whole that are nearest to each."""
     x = points - points.mean(axis=0)
-    moved = deviations - deviations.mean(axis=1, keepdims=True)
-    inertia = np.sum(x**2) * np.eye(3) - x.T @ x
-    moment = np.cross(x, moved).sum(axis=1)
-    turn = moment @ np.linalg.pinv(inertia, hermitian=True)
-    result: Floats = moved - np.cross(turn[:, None, :], x)
-    return result
+    x /= np.sqrt(np.mean(x**2))
+    motions = np.concatenate([np.broadcast_to(np.eye(3), (len(x), 3, 3)), hat(x)], axis=2).reshape(-1, 6)
+    basis, size, _ = np.linalg.svd(motions, full_matrices=False)
+    basis = basis[:, size > _FLAT * size[0]]
+    flat = deviations.reshape(len(basis), -1)
+    return np.asarray((flat - basis @ (basis.T @ flat)).reshape(deviations.shape))
 
 
 def point_uncertainty(adjustment: Adjustment, layout: Layout, points: Floats, tangent: Floats, walk: Floats) -> Floats:
@@ -62,7 +66,7 @@ def point_uncertainty(adjustment: Adjustment, layout: Layout, points: Floats, ta
     count = int(np.clip(_NUMBERS // (3 * len(rows)), _FEWEST, _MOST))
     drawn = adjustment.draws(count, np.random.default_rng(_SEED))
     moved = _without_motion(_deviations(layout, rows, points, tangent, drawn), points[rows])
-    common = np.interp(np.arange(layout.size), rows, np.sum(moved**2, axis=2).mean(axis=0))
+    common = np.interp(np.arange(layout.size), rows, np.einsum("kid,kid->k", moved, moved) / count)
     t = _share(layout, np.arange(layout.size))
     bridge = 3 * walk[layout.curve] * layout.segment_lengths[layout.row_segment] * t * (1 - t)
     result: Floats = np.sqrt(common + bridge)

@@ -88,8 +88,8 @@ def choose_weights(curves: Sequence[PlacedCurve], samples: NetworkSamples, step:
     few = curves[: max(1, int(np.searchsorted(samples.layout.first, _ENOUGH_ROWS)))]
     part = samples if len(few) == len(curves) else samples.first_curves(len(few))
     trials = _Trials(DevelopedSpline(part), measured_offsets(few, part), _folds(few, step))
-    weights = _search(trials, step)
-    return Choice(weights, trials.error(weights), smooth_frames(curves, samples, weights))
+    weights, noise = _search(trials, step)
+    return Choice(weights, noise, smooth_frames(curves, samples, weights))
 
 
 def smooth_frames(curves: Sequence[PlacedCurve], samples: NetworkSamples, weights: Weights) -> Floats:
@@ -98,8 +98,10 @@ def smooth_frames(curves: Sequence[PlacedCurve], samples: NetworkSamples, weight
     return spline.frames(spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(weights)))
 
 
-def _search(trials: _Trials, step: float) -> Weights:
-    """Downhill over trial bends from one step on, a parabola through the lowest three, then the stretch."""
+def _search(trials: _Trials, step: float) -> tuple[Weights, float]:
+    """Best weights and their error: downhill over trial bends from one step on, a parabola through the lowest three,
+    then up the stretches for as long as they help.
+    """
     error = cache(lambda i: trials.error(Weights(0.0, float(_BENDS[i]) * step)))
     best, before = int(np.flatnonzero(_BENDS == 1.0)[0]), -1
     while best != before:
@@ -109,8 +111,15 @@ def _search(trials: _Trials, step: float) -> Weights:
     if 0 < best < len(_BENDS) - 1:
         around = range(best - 1, best + 2)
         bend = float(np.exp(_vertex([float(np.log(_BENDS[i])) for i in around], [error(i) for i in around])))
-    found = {stretch: trials.error(Weights(stretch * step, bend * step)) for stretch in (0.0, *_STRETCHES)}
-    return Weights(min(found, key=lambda s: found[s]) * step, bend * step)
+    found = Weights(0.0, bend * step)
+    least = trials.error(found)
+    for stretch in _STRETCHES:
+        trial = Weights(stretch * step, bend * step)
+        there = trials.error(trial)
+        if there >= least:
+            break
+        found, least = trial, there
+    return found, least
 
 
 def noise_level(curves: Sequence[PlacedCurve], choice: Choice, step: float) -> NoiseLevel:
