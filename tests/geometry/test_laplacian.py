@@ -5,7 +5,7 @@ import pytest
 import robust_laplacian
 
 from tracemesh.geometry.network import Floats, Ints
-from tracemesh.geometry.surfaces.curvature import gaussian_curvature, mean_curvature
+from tracemesh.geometry.surfaces.curvature import gaussian_curvature, mean_curvature, normalised, sphere_normals
 from tracemesh.geometry.surfaces.edges import boundary_vertices, interior_edges, unique_edges
 from tracemesh.geometry.surfaces.flattening import flatten
 from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian, triangle_areas
@@ -185,3 +185,9 @@ def test_quality_of_an_octahedron() -> None:
     assert (quality.euler_number, quality.boundary_loops, quality.inverted_faces) == (2, 0, 0)
     assert quality.min_angle_deg == pytest.approx(60)
     assert mesh_quality(vertices, faces[1:], vertices).boundary_loops == 1
+
+
+def test_normals_from_positions_are_exact_on_any_mesh_of_a_sphere() -> None:
+    vertices, faces = icosphere(3)
+    uneven = normalised(vertices + 0.03 * np.random.default_rng(2).normal(size=vertices.shape))
+    np.testing.assert_allclose(sphere_normals(5 * uneven + 1, faces), uneven, atol=1e-12)

@@ -39,6 +39,18 @@ def gaussian_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats
     return np.asarray(total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
 
 
+def sphere_normals(vertices: Floats, faces: Ints) -> Floats:
+    """(n, 3) unit normals of a mesh from its positions alone, exact where vertices lie on a sphere (Max 1999).
+
+    vertices: (n, 3). faces: (f, 3). Each face's cross product counts over the squared lengths of the two edges beside.
+    """
+    edges = np.roll(vertices[faces], -1, axis=1) - vertices[faces]  # from every corner to the next
+    behind = np.roll(edges, 1, axis=1)
+    size = (edges**2).sum(2) * (behind**2).sum(2)
+    share = np.cross(behind, edges) / size[..., None]
+    return normalised(np.column_stack([np.bincount(faces.ravel(), share[..., k].ravel()) for k in range(3)]))
+
+
 def _spanned(corners: Floats) -> Floats:
     """(f, 3) cross products of two edges of triangles (f, 3, 3)."""
     return np.asarray(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))

@@ -4,9 +4,11 @@ import numpy as np
 
 from tracemesh.geometry.network import Floats, Ints
 from tracemesh.geometry.surfaces.biharmonic import BiharmonicSolver
-from tracemesh.geometry.surfaces.curvature import mean_curvature, normalised
+from tracemesh.geometry.surfaces.curvature import mean_curvature, normalised, sphere_normals
 from tracemesh.geometry.surfaces.edges import boundary_vertices
 from tracemesh.geometry.surfaces.laplacian import Laplacian, surface_laplacian
+
+REBUILDS = 2  # solves in the metric of the last one; more change little
 
 
 def linear_surface(
@@ -18,11 +20,7 @@ def linear_surface(
     vertices.
     Raises SurfaceError if they do not determine the rest.
     """
-    solver = BiharmonicSolver(laplacian, len(points), boundary_vertices(faces, len(laplacian.mass)))
-    base, spread = np.hsplit(solver.solve(np.hstack([points, normals])), 2)
-    spread = normalised(spread + np.sqrt(np.maximum(1 - (spread**2).sum(1, keepdims=True), 0)) * lift)
-    target = (-2 * mean_curvature(base, faces, spread) * laplacian.mass)[:, None] * spread
-    return solver.solve(points, target), spread
+    return _solved(laplacian, faces, points, normals, lift)[1:]
 
 
 def rebuilt_surface(
@@ -30,3 +28,42 @@ def rebuilt_surface(
 ) -> tuple[Floats, Floats]:
     """The same in the metric of a surface (n, 3) found before: planar patches measure lengths and angles too short."""
     return linear_surface(surface_laplacian(vertices, faces), faces, points, normals, lift)
+
+
+def settled_surface(
+    vertices: Floats, faces: Ints, points: Floats, normals: Floats, lift: Floats
+) -> tuple[Floats, Floats]:
+    """Rebuilt until it changes little, with its own curvature matched to that of its normals; arguments as above.
+
+    Vertices move along their normals only: sideways nothing holds them, and triangles would drift out of shape.
+    """
+    for _ in range(REBUILDS):
+        laplacian = surface_laplacian(vertices, faces)
+        solver, rebuilt, spread = _solved(laplacian, faces, points, normals, lift)
+        vertices = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
+        vertices[: len(points)] = points
+    short = _missing_curvature(vertices, faces, spread, len(points))
+    more = solver.solve(np.zeros_like(points), (-2 * short * laplacian.mass)[:, None] * spread)
+    return vertices + (more * spread).sum(1, keepdims=True) * spread, spread
+
+
+def _missing_curvature(vertices: Floats, faces: Ints, normals: Floats, fixed: int) -> Floats:
+    """(n,) 1/m, mean curvature of the normals less that of the surface's own normals, by the same formula.
+
+    The cotangent Laplacian of a smooth surface is not its curvature where triangles are irregular, so solving for it
+    leaves a difference; normals of the network, the first `fixed`, count on both sides.
+    """
+    own = sphere_normals(vertices, faces)
+    own[:fixed] = normals[:fixed]
+    return mean_curvature(vertices, faces, normals) - mean_curvature(vertices, faces, own)
+
+
+def _solved(
+    laplacian: Laplacian, faces: Ints, points: Floats, normals: Floats, lift: Floats
+) -> tuple[BiharmonicSolver, Floats, Floats]:
+    """The solver, and the vertices and normals that it finds."""
+    solver = BiharmonicSolver(laplacian, len(points), boundary_vertices(faces, len(laplacian.mass)))
+    base, spread = np.hsplit(solver.solve(np.hstack([points, normals])), 2)
+    spread = normalised(spread + np.sqrt(np.maximum(1 - (spread**2).sum(1, keepdims=True), 0)) * lift)
+    target = (-2 * mean_curvature(base, faces, spread) * laplacian.mass)[:, None] * spread
+    return solver, solver.solve(points, target), spread

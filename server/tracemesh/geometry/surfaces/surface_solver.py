@@ -15,11 +15,10 @@ from scipy import sparse
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints
 from tracemesh.geometry.surfaces.bridges import Outline
 from tracemesh.geometry.surfaces.cell_complex import CellComplex
-from tracemesh.geometry.surfaces.linear_surface import rebuilt_surface
+from tracemesh.geometry.surfaces.linear_surface import settled_surface
 from tracemesh.geometry.surfaces.patches import PatchMesh, outlines_of
 from tracemesh.geometry.surfaces.refinement import refine
 from tracemesh.geometry.surfaces.surface_stages import (
-    REBUILDS,
     Progress,
     Stages,
     SurfaceParameters,
@@ -186,8 +185,4 @@ def _refined_again(vertices: Floats, normals: Floats, faces: Ints, patch: Ints, 
 
 
 def _rebuilt_again(vertices: Floats, normals: Floats, faces: Ints, patch: Ints, fixed: int) -> tuple[Floats, Floats]:
-    points, known = vertices[:fixed], normals[:fixed]
-    for _ in range(REBUILDS):
-        rebuilt, normals = rebuilt_surface(vertices, faces, points, known, np.zeros_like(vertices))
-        vertices = vertices + ((rebuilt - vertices) * normals).sum(1, keepdims=True) * normals
-    return vertices, normals
+    return settled_surface(vertices, faces, vertices[:fixed], normals[:fixed], np.zeros_like(vertices))

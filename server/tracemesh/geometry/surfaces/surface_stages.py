@@ -14,7 +14,7 @@ from tracemesh.geometry.surfaces.cell_complex import CellComplex, cell_complex, 
 from tracemesh.geometry.surfaces.curvature import extended_to_boundary, gaussian_curvature, mean_curvature
 from tracemesh.geometry.surfaces.edges import boundary_vertices
 from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian
-from tracemesh.geometry.surfaces.linear_surface import linear_surface, rebuilt_surface
+from tracemesh.geometry.surfaces.linear_surface import linear_surface, rebuilt_surface, settled_surface
 from tracemesh.geometry.surfaces.patches import PatchMesh, triangulate_patches, unrolled_well
 from tracemesh.geometry.surfaces.quality import inverted_faces, mesh_quality
 from tracemesh.geometry.surfaces.refinement import refine
@@ -26,7 +26,6 @@ COARSE = 3.0  # edges inside the patches of the first solve, which only serves t
 LARGEST_UNROLLS = 4
 LARGEST_AUTOMATIC = 20_000  # vertices; the factorisation of the refinement grows faster than the mesh
 FARTHEST = 2.0  # distance of a vertex from the middle of the network, over its diagonal
-REBUILDS = 2  # solves in the metric of the last one; more change little
 
 
 @dataclass(frozen=True)
@@ -144,12 +143,8 @@ def linear_patches(
         last = (patches, vertices)
     if parameters.soft is not None:
         points = _softened(complex_.network, patches, vertices, spread, parameters.soft)
-    for step in range(REBUILDS):
-        stages.begin("rebuild", 0.35 + 0.15 * step / REBUILDS)
-        rebuilt, spread = rebuilt_surface(vertices, patches.faces, points, normals, patches.lift)
-        # Along the normal only: sideways nothing holds the vertices, and triangles would drift out of shape.
-        vertices = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
-        vertices[: len(points)] = points
+    stages.begin("rebuild", 0.35)
+    vertices, spread = settled_surface(vertices, patches.faces, points, normals, patches.lift)
     _check_spread(complex_, patches, vertices, spread)
     return patches, vertices, spread
 
