@@ -13,13 +13,25 @@ from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 
 from tracemesh.api.access import Access
+from tracemesh.api.comparing import Comparer
 from tracemesh.api.compression import WeakTags
 from tracemesh.api.errors import install_handlers
 from tracemesh.api.live.hub import Hub
 from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
-from tracemesh.api.routes import archives, curves, ingest, live, pages, proposals, reconstructions, recordings, sessions
+from tracemesh.api.routes import (
+    archives,
+    comparisons,
+    curves,
+    ingest,
+    live,
+    pages,
+    proposals,
+    reconstructions,
+    recordings,
+    sessions,
+)
 from tracemesh.api.services import Services
 from tracemesh.errors import Unavailable
 from tracemesh.jobs.runner import JobRunner
@@ -61,7 +73,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     install_handlers(app)
     api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
-    for module in (archives, sessions, curves, recordings, proposals, reconstructions, ingest, live):
+    for module in (archives, sessions, curves, recordings, proposals, comparisons, reconstructions, ingest, live):
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(pages.router)
@@ -88,17 +100,18 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     hub = Hub(database, settings.resolved_database_url, recorder.flush)
     metrics.watch("devices", "Devices connected", lambda: recorder.open_count)
     metrics.watch("watchers", "Browsers that watch a session", lambda: hub.watcher_count)
-    previewer = Previewer(database, recorder.flush)
+    previewer, comparer = Previewer(database, recorder.flush), Comparer()
     runner = JobRunner(settings, database, tell)
     store = open_artifacts(settings)
     tidying = asyncio.create_task(_collect_garbage(database, store))
     try:
-        yield Services(settings, database, store, recorder, hub, previewer, metrics, runner, loop)
+        yield Services(settings, database, store, recorder, hub, previewer, comparer, metrics, runner, loop)
     finally:
         tidying.cancel()
         await asyncio.to_thread(runner.close)
         await hub.close()
         await previewer.close()
+        await comparer.close()
         await recorder.close()
         database.close()
 

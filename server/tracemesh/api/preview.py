@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from tracemesh.api.live.drawing import flat
 from tracemesh.errors import Conflict, TracemeshError
+from tracemesh.formats.rawnet import write_rawnet
 from tracemesh.geometry.scan import Floats, Scan
 from tracemesh.jobs.attached import SolvedNetwork, solve_network
 from tracemesh.jobs.proposals import propose_nodes
@@ -66,6 +67,11 @@ class Previewer:
         by_index = {curve.index: curve for curve in curves}
         async with self._turn:
             return await self._run(propose_nodes, scan, [by_index[i] for i in indices])
+
+    async def rawnet(self, session: str) -> str:
+        """The session's scan as a rawnet; raises NotFound and ScanError."""
+        scan, _, _ = await self._scan(session)
+        return await asyncio.to_thread(write_rawnet, scan)
 
     async def _run(self, function: Callable[..., T], *arguments: object) -> T:
         try:

@@ -9,6 +9,7 @@ from fastapi import Depends, Header
 from sqlalchemy.orm import Session as Transaction
 from starlette.requests import HTTPConnection
 
+from tracemesh.api.comparing import Comparer
 from tracemesh.api.live.hub import Hub
 from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
@@ -29,6 +30,7 @@ class Services:
     recorder: Recorder
     hub: Hub
     previewer: Previewer
+    comparer: Comparer
     metrics: Metrics
     runner: JobRunner
     loop: asyncio.AbstractEventLoop

@@ -47,6 +47,37 @@ class Outline(Message):
     curves: list[OutlineCurve]
 
 
+class ComparisonProgress(Message):
+    """A line of the answer to POST /reconstructions/{reconstruction}/comparison while it is worked on."""
+
+    type: Literal["progress"] = "progress"
+    stage: str
+    fraction: float = Field(ge=0, le=1)
+
+
+class Comparison(Message):
+    """Its last line: how far the surface is from a true one, in % of the truth's diagonal unless it says otherwise."""
+
+    type: Literal["comparison"] = "comparison"
+    mean: float
+    rms: float
+    max: float
+    min: float
+    normal_deg: float | None = Field(description="mean angle to the true normals, degrees")
+    diagonal: float = Field(description="m, of the truth's bounding box")
+    rotation: list[Vector] = Field(description="rows; a vertex x was placed at scale * rotation x + translation")
+    translation: Vector = Field(description="m")
+    scale: float
+    signed_distance: list[float] = Field(description="m, of every vertex of mesh.glb; negative inside the truth")
+
+
+class ComparisonFailure(Message):
+    """Its last line when it could not be done."""
+
+    type: Literal["failure"] = "failure"
+    detail: str
+
+
 class Mark(Message):
     """A node marked on a curve."""
 

@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
+from fastapi.responses import PlainTextResponse
 
 from tracemesh.api.outline import outline
 from tracemesh.api.services import IdempotencyKey, Reading, UseServices, Writing
@@ -49,6 +50,13 @@ def get(session: Identifier, transaction: Reading) -> Session:
 def draw(session: Identifier, transaction: Reading, services: UseServices) -> Outline:
     """Its curves in few points: as reconstructed, else as reckoned from what was sent."""
     return outline(transaction, services.artifacts, session)
+
+
+@router.get("/{session}/scan.rawnet", response_class=PlainTextResponse)
+async def rawnet(session: Identifier, services: UseServices) -> PlainTextResponse:
+    """Its curves as edited, with the frames that the readings give: for other programs."""
+    headers = {"Content-Disposition": f'attachment; filename="{session}.rawnet"'}
+    return PlainTextResponse(await services.previewer.rawnet(session), headers=headers)
 
 
 @router.patch("/{session}")

@@ -1,5 +1,6 @@
 """How far points, and the normals at them, are from a true mesh (thesis 3.7.3 and 5.3.2)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,7 +19,7 @@ class Evaluation:
     """mean, rms, max, min: distance to the true surface in % of the truth's bounding-box diagonal (m).
 
     normal_deg: mean angle to the true normals, degrees; None when no normals were given. placement: how the points
-    were aligned first. distance: (n,) m, of every point.
+    were aligned first. distance: (n,) m, of every point; signed: (n,) m, the same, negative inside the true surface.
     """
 
     mean: float
@@ -29,6 +30,7 @@ class Evaluation:
     diagonal: float
     placement: Placement
     distance: Floats
+    signed: Floats
 
     def summary(self) -> dict[str, object]:
         """The figures as plain JSON."""
@@ -51,27 +53,36 @@ class Evaluation:
 
 
 def evaluate(
-    points: Floats, normals: Floats | None, truth_vertices: Floats, truth_faces: Ints, align: Alignment = "none"
+    points: Floats,
+    normals: Floats | None,
+    truth_vertices: Floats,
+    truth_faces: Ints,
+    align: Alignment = "none",
+    progress: Callable[[float], None] = lambda fraction: None,
 ) -> Evaluation:
     """Distances of points (n, 3) m to the true mesh, after aligning them to it, and angles of normals (n, 3) if given.
 
-    The true normals are those of the mesh's vertices, interpolated. Raises InputError when there are no points.
+    The true normals are those of the mesh's vertices, interpolated. `progress` hears the fraction of the alignment.
+    Raises InputError when there are no points.
     """
     if len(points) == 0:
         raise InputError("wanted at least one point to evaluate, got none")
     placement = Placement(np.eye(3), np.zeros(3))
     if align != "none":
-        placement = register(points, truth_vertices, truth_faces, scaled=align == "similarity")
-    weights, distance, face = ClosestPoints(truth_vertices, truth_faces)(placement.apply(points))
+        placement = register(points, truth_vertices, truth_faces, align == "similarity", progress)
+    placed, closest = placement.apply(points), ClosestPoints(truth_vertices, truth_faces)
+    weights, distance, face = closest(placed)
+    true = np.einsum("nk,nki->ni", weights, vertex_normals(truth_vertices, truth_faces)[truth_faces[face]])
+    outside = np.einsum("ni,ni->n", placed - closest.at(weights, face), true) >= 0
     diagonal = float(np.linalg.norm(np.ptp(truth_vertices, axis=0)))
     percent = 100 * distance / diagonal
     angle = None
     if normals is not None:
-        true = np.einsum("nk,nki->ni", weights, vertex_normals(truth_vertices, truth_faces)[truth_faces[face]])
         angle = float(np.degrees(np.mean(_angles(normals @ placement.rotation.T, true))))
     rms = float(np.sqrt(np.mean(percent**2)))
     worst, best = float(percent.max()), float(percent.min())
-    return Evaluation(float(percent.mean()), rms, worst, best, angle, diagonal, placement, distance)
+    signed = np.where(outside, distance, -distance)
+    return Evaluation(float(percent.mean()), rms, worst, best, angle, diagonal, placement, distance, signed)
 
 
 def hausdorff_distance(vertices: Floats, faces: Ints, other_vertices: Floats, other_faces: Ints) -> float:

@@ -5,6 +5,7 @@ distance to the tangent plane (inside the mesh), to the edge (at its rim) or to 
 minimum and converges fast on smooth surfaces, where the usual point-to-point step (Besl and McKay 1992) creeps along.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,23 +38,31 @@ class Placement:
         return result
 
 
-def register(points: Floats, vertices: Floats, faces: Ints, scaled: bool = False) -> Placement:
+def register(
+    points: Floats,
+    vertices: Floats,
+    faces: Ints,
+    scaled: bool = False,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> Placement:
     """Best placement of points (n, 3) on a mesh, without or with a scale.
 
     Begins with the same orientation; when that does not fit well, also with the principal axes matched in all ways, and
     returns the best. With a scale, distances are counted in the points' own unit: otherwise the best scale were zero.
+    `progress` hears the fraction done, which jumps ahead when fewer steps are enough.
     """
     target = _Target(vertices, faces)
     rotations = [np.eye(3), *_axis_matches(points, vertices)]
     some = points[:: -(-len(points) // _TRIAL_POINTS)]
     best, least = Placement(np.eye(3), np.zeros(3)), np.inf
-    for rotation in rotations:
+    for trial, rotation in enumerate(rotations):
+        progress(trial / (2 * len(rotations)))
         placement, misfit = _descend(some, _start(points, vertices, rotation, scaled), target, scaled, _TRIAL_STEPS)
         if misfit < _CLEARLY * least:
             best, least = placement, misfit
         if least < _GOOD:
             break
-    return _descend(points, best, target, scaled, _STEPS)[0]
+    return _descend(points, best, target, scaled, _STEPS, lambda part: progress((1 + part) / 2))[0]
 
 
 class _Target:
@@ -108,10 +117,18 @@ def _axis_matches(points: Floats, vertices: Floats) -> list[Floats]:
     return rotations
 
 
-def _descend(points: Floats, start: Placement, target: _Target, scaled: bool, steps: int) -> tuple[Placement, float]:
+def _descend(
+    points: Floats,
+    start: Placement,
+    target: _Target,
+    scaled: bool,
+    steps: int,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> tuple[Placement, float]:
     """Where at most so many steps lead from a start, and the misfit there: rms distance over the points' extent."""
     here, damping = _Fit.of(points, start, target), 1e-6
-    for _ in range(steps):
+    for taken in range(steps):
+        progress(taken / steps)
         gradient, hessian, size = _normal_equations(here, scaled)
         damped = hessian + damping * len(points) * np.eye(len(gradient))
         step = np.linalg.solve(damped, -gradient).astype(np.float64)
