@@ -1,6 +1,5 @@
 """A calibration undoes what a device's sensors do wrong, later too; what it cannot be applied to is said."""
 
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -15,13 +14,14 @@ from scipy.spatial.transform import Rotation
 from tracemesh.errors import InputError, ScanError
 from tracemesh.formats.calibrations import calibration_from_readings, corrections, read_calibration, write_calibration
 from tracemesh.formats.recordings import Recording, recording_from_simulation, scan_from_recordings, write_recording
+from tracemesh.formats.references import with_calibration
 from tracemesh.formats.scans import read_scan
 from tracemesh.geometry.sensing.orientation import angles_between
 from tracemesh.geometry.simulated.shapes import leaf
 from tracemesh.geometry.simulated.simulation import Imperfections, plan_scan, simulate_scan
 from tracemesh.pipeline import reconstruct
 from tracemesh.wire.calibration import Calibration, CalibrationReadings, StraightRun
-from tracemesh.wire.device import Samples
+from tracemesh.wire.device import Device, Samples
 from tracemesh.wire.resources import ReconstructionParameters
 
 Floats = NDArray[np.float64]
@@ -67,7 +67,7 @@ def test_an_old_recording_gets_its_true_orientations_by_a_later_calibration(
     calibration: Calibration, recordings: tuple[Recording, Recording]
 ) -> None:
     truth, raw = (scan_from_recordings([r]) for r in recordings)
-    later = scan_from_recordings([replace(recordings[1], calibration=calibration)])
+    later = scan_from_recordings([with_calibration(recordings[1], calibration)])
     for true, measured, corrected in zip(truth.curves, raw.curves, later.curves, strict=True):
         assert np.degrees(angles_between(true.normal, measured.normal)).max() > 3
         assert np.degrees(angles_between(true.normal, corrected.normal)).max() < 0.05
@@ -77,7 +77,7 @@ def test_an_old_recording_gets_its_true_orientations_by_a_later_calibration(
 
 def test_the_report_says_what_was_used(calibration: Calibration, recordings: tuple[Recording, Recording]) -> None:
     parameters = ReconstructionParameters(step="6%", surface=False)
-    both = [recordings[0], replace(recordings[1], calibration=calibration)]
+    both = [recordings[0], with_calibration(recordings[1], calibration)]
     scan = scan_from_recordings(both)
     half = len(scan.curves) // 2
     report = reconstruct(scan, parameters).report
@@ -144,17 +144,18 @@ def test_a_matrix_that_cannot_be_undone_is_refused(calibration: Calibration) -> 
 def test_faces_turn_both_sensors(calibration: Calibration) -> None:
     case = Rotation.from_rotvec([0.0, 0.0, 0.1])
     faces = wrong(case.inv().apply(np.vstack([np.eye(3), -np.eye(3)])), np.ones((6, 3)))["acceleration"]
-    turned = corrections(calibration_from_readings("simulated", readings(faces=faces)))
-    for name, before in corrections(calibration).items():
-        np.testing.assert_allclose(turned[name].matrix, case.as_matrix() @ before.matrix, atol=1e-7)
+    turned = calibration_from_readings("simulated", readings(faces=faces))
+    one, other = (corrections(Device(id="simulated", kind="morphorider", calibration=c)) for c in (calibration, turned))
+    for name, before in one.items():
+        np.testing.assert_allclose(other[name].matrix, case.as_matrix() @ before.matrix, atol=1e-7)
 
 
 def test_another_devices_calibration_is_refused(
     calibration: Calibration, recordings: tuple[Recording, Recording]
 ) -> None:
     other = calibration.model_copy(update={"device": "other"})
-    with pytest.raises(InputError, match="curve 1: wanted a calibration of the device simulated, got one of other"):
-        scan_from_recordings([replace(recordings[1], calibration=other)])
+    with pytest.raises(InputError, match="wanted a calibration of the device simulated, got one of other"):
+        with_calibration(recordings[1], other)
 
 
 def test_a_calibration_that_changes_nothing_is_refused(

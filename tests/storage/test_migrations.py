@@ -10,6 +10,7 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Column, Connection, MetaData, select
 
 from tracemesh.storage.database import Database, migrations
+from tracemesh.storage.devices import list_devices
 
 REVISIONS = [script.revision for script in ScriptDirectory.from_config(migrations()).walk_revisions()]
 VALUES: dict[type, Any] = {str: "x", int: 3, float: 0.5, bool: True, bytes: b"{}", object: {"a": 1}}
@@ -65,3 +66,21 @@ def test_every_row_of_an_earlier_schema_is_kept(
             (found,) = connection.execute(select(*kept)).mappings()
             told = {column: v.replace(tzinfo=UTC) if isinstance(v, datetime) else v for column, v in found.items()}
             assert told == {column.name: row[column.name] for column in kept}, name
+
+
+def test_devices_of_earlier_recordings_are_known(database_url: str, databases: Callable[[str], Database]) -> None:
+    database = databases(database_url)
+    database.migrate("0001")
+    times = [datetime(2026, 1, day, tzinfo=UTC) for day in (1, 2, 3)]
+    hello = b'{"type": "hello", "recording": "r", "device": {"id": "%s", "kind": "phone"}}'
+    with database.engine.begin() as connection:
+        tables = reflected(connection).tables
+        connection.execute(tables["sessions"].insert(), {"id": "s", "name": "", "created": times[0]})
+        row = {"session_id": "s", "made_session": False, "next_seq": 0, "bytes": 0}
+        for key, (device, time) in enumerate(zip((b"a", b"b", b"a"), times, strict=True), 1):
+            more = {"key": key, "id": str(key), "hello": hello % device, "created": time}
+            connection.execute(tables["recordings"].insert(), row | more)
+    database.migrate()
+    with database.read() as transaction:
+        known = {d.id: (d.kind, d.first_seen, d.last_seen) for d in list_devices(transaction)}
+    assert known == {"a": ("phone", times[0], times[2]), "b": ("phone", times[1], times[1])}

@@ -80,6 +80,10 @@ export interface SensorCorrection {
  */
 export interface CalibrationCreate {
   calibration: Calibration | null;
+  /**
+   * of the device, if the server does not know it yet
+   */
+  kind: string;
   readings: CalibrationReadings | null;
 }
 /**
@@ -117,6 +121,55 @@ export interface StraightRun {
   length: number;
   ticks: [number, number][];
   ticks_per_turn: number;
+}
+/**
+ * Its last line: how far the surface is from a true one, in % of the truth's diagonal unless it says otherwise.
+ */
+export interface Comparison {
+  /**
+   * m, of the truth's bounding box
+   */
+  diagonal: number;
+  max: number;
+  mean: number;
+  min: number;
+  /**
+   * mean angle to the true normals, degrees
+   */
+  normal_deg: number | null;
+  rms: number;
+  /**
+   * rows; a vertex x was placed at scale * rotation x + translation
+   */
+  rotation: [number, number, number][];
+  scale: number;
+  /**
+   * m, of every vertex of mesh.glb; negative inside the truth
+   */
+  signed_distance: number[];
+  /**
+   * m
+   *
+   * @minItems 3
+   * @maxItems 3
+   */
+  translation: [number, number, number];
+  type: "comparison";
+}
+/**
+ * Its last line when it could not be done.
+ */
+export interface ComparisonFailure {
+  detail: string;
+  type: "failure";
+}
+/**
+ * A line of the answer to POST /reconstructions/{reconstruction}/comparison while it is worked on.
+ */
+export interface ComparisonProgress {
+  fraction: number;
+  stage: string;
+  type: "progress";
 }
 /**
  * One scanned curve of a session.
@@ -194,6 +247,10 @@ export interface CurveUpdate {
  * Who measures, and what is needed to read its numbers.
  */
 export interface Device {
+  /**
+   * of this device, chosen by whoever records; the readings are as measured all the same
+   */
+  calibration: Calibration | null;
   id: string;
   /**
    * morphorider, phone, sensorserver, file, ...
@@ -543,11 +600,24 @@ export interface Problem {
  */
 export interface RecordingSummary {
   bytes: number;
+  /**
+   * of its device, applied when it is reconstructed
+   */
+  calibration: number | null;
   created: string;
   device: Device;
   id: string;
   messages: number;
   session: string;
+}
+/**
+ * PATCH /sessions/{session}/recordings/{recording}; absent fields stay.
+ */
+export interface RecordingUpdate {
+  /**
+   * version of its device's calibration; null: none
+   */
+  calibration: number | null;
 }
 /**
  * Directions in the world (ENU) that the accelerometer and the magnetometer see at rest.
@@ -668,6 +738,10 @@ export interface Snapshot {
  * The server's answer to hello.
  */
 export interface Welcome {
+  /**
+   * the newest one of this device that the server has and the recording does not use
+   */
+  calibration: string | null;
   /**
    * number of the first message that the server does not have
    */

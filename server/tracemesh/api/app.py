@@ -24,6 +24,7 @@ from tracemesh.api.routes import (
     archives,
     comparisons,
     curves,
+    devices,
     ingest,
     live,
     pages,
@@ -73,7 +74,8 @@ def create_app(settings: Settings) -> FastAPI:
     )
     install_handlers(app)
     api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
-    for module in (archives, sessions, curves, recordings, proposals, comparisons, reconstructions, ingest, live):
+    routes = (archives, sessions, curves, recordings, proposals, comparisons, reconstructions, devices, ingest, live)
+    for module in routes:
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(pages.router)

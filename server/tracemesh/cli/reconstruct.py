@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -124,7 +123,7 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
 def _field(chosen: argparse.Namespace, calibration: Calibration | None) -> ReferenceField | None:
     """The magnetic field that the person names, if any; what a device at rest measured is calibrated, too."""
     from tracemesh.formats.recordings import read_recording
-    from tracemesh.formats.references import measured_reference
+    from tracemesh.formats.references import measured_reference, with_calibration
     from tracemesh.geometry.sensing.magnetic_field import field_at
 
     if chosen.date and not chosen.place:
@@ -134,7 +133,7 @@ def _field(chosen: argparse.Namespace, calibration: Calibration | None) -> Refer
         return field_at(latitude, longitude, chosen.date or date.today())
     if chosen.still:
         still = read_recording(read_text(chosen.still).split("\n"), chosen.still)
-        return measured_reference(replace(still, calibration=calibration))
+        return measured_reference(with_calibration(still, calibration))
     return None
 
 

@@ -20,11 +20,11 @@ _READY = ({"tangent", "normal"}, {"quaternion"})
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A curve's columns and its device with a calibration applied; `used` tells whether it made a difference."""
+    """A curve's columns and its device with a calibration applied; label: its name, empty if it made no difference."""
 
     columns: dict[str, Floats]
     device: Device
-    used: bool
+    label: str
 
 
 def read_calibration(text: str, source: str = "") -> Calibration:
@@ -86,9 +86,10 @@ def _in_message(fit: SensorFit) -> SensorCorrection:
     )
 
 
-def corrections(calibration: Calibration) -> dict[str, Correction]:
+def corrections(device: Device) -> dict[str, Correction]:
     """What makes `acceleration` and `magnetic` right, by name; the second one is turned into the first one's axes."""
-    if calibration.accelerometer is None or calibration.magnetometer is None:
+    calibration = device.calibration
+    if calibration is None or calibration.accelerometer is None or calibration.magnetometer is None:
         return {}
     turn = quaternion_to_matrix(normalized(np.array(calibration.alignment)))
     up, field = (_correction(c) for c in (calibration.accelerometer, calibration.magnetometer))
@@ -99,21 +100,20 @@ def _correction(message: SensorCorrection) -> Correction:
     return Correction(np.array(message.matrix, float), np.array(message.offset, float))
 
 
-def calibrate(columns: dict[str, Floats], device: Device, calibration: Calibration | None) -> Calibrated:
-    """What a device would have sent with right sensors and the right wheel; None changes nothing.
-
-    Raises InputError where the calibration is another device's.
-    """
-    if calibration is None:
-        return Calibrated(columns, device, used=False)
-    if calibration.device != device.id:
-        raise InputError(f"wanted a calibration of the device {device.id}, got one of {calibration.device}")
-    found = corrections(calibration)
+def calibrate(columns: dict[str, Floats], device: Device) -> Calibrated:
+    """What a device would have sent with right sensors and the right wheel, by its calibration; without one as sent."""
+    if device.calibration is None:
+        return Calibrated(columns, device, "")
+    found = corrections(device)
     right = {name: found[name](column) if name in found else column for name, column in columns.items()}
     turned = bool(found.keys() & columns.keys()) and not any(ready <= columns.keys() for ready in _READY)
-    rolled = calibration.circumference is not None and device.wheel is not None and "ticks" in columns
-    rolled = rolled and "distance" not in columns
-    if rolled and device.wheel is not None:
-        wheel = device.wheel.model_copy(update={"circumference": calibration.circumference})
-        device = device.model_copy(update={"wheel": wheel})
-    return Calibrated(right, device, used=turned or rolled)
+    rolled = device.calibration.circumference is not None and "ticks" in columns and "distance" not in columns
+    return Calibrated(right, with_right_wheel(device), device.calibration.label if turned or rolled else "")
+
+
+def with_right_wheel(device: Device) -> Device:
+    """The device with the wheel that its calibration measured, if it did and the device has one."""
+    if device.wheel is None or device.calibration is None or device.calibration.circumference is None:
+        return device
+    wheel = device.wheel.model_copy(update={"circumference": device.calibration.circumference})
+    return device.model_copy(update={"wheel": wheel})

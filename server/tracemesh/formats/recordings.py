@@ -24,7 +24,6 @@ from tracemesh.geometry.simulated.simulation import (
     WHEEL_CIRCUMFERENCE,
     SimulatedCurve,
 )
-from tracemesh.wire.calibration import Calibration
 from tracemesh.wire.device import (
     MAX_SAMPLES,
     CurveEnd,
@@ -42,11 +41,10 @@ from tracemesh.wire.device import (
 
 @dataclass(frozen=True)
 class Recording:
-    """hello, and the numbered messages after it in their order; and the calibration that was chosen for it, if any."""
+    """hello, and the numbered messages after it in their order."""
 
     hello: Hello
     messages: Sequence[Recorded]
-    calibration: Calibration | None = None
 
 
 def read_recording(lines: Iterable[str], source: str = "") -> Recording:
@@ -88,7 +86,7 @@ def scan_from_recordings(recordings: Sequence[Recording]) -> Scan:
     curves: list[CurveScan] = []
     for recording in recordings:
         for raw in _raw_curves(recording, len(curves)):
-            curves.append(_named(f"curve {len(curves) + 1}", raw, recording))
+            curves.append(_named(f"curve {len(curves) + 1}", raw, recording.hello.device))
     return Scan(tuple(curves))
 
 
@@ -211,15 +209,15 @@ def _raw_curves(recording: Recording, before: int) -> Iterator[_RawCurve]:
     return (c for c in curves.values() if c.count and not c.discarded)
 
 
-def _named(name: str, raw: _RawCurve, recording: Recording) -> CurveScan:
+def _named(name: str, raw: _RawCurve, device: Device) -> CurveScan:
     try:
-        return _curve(raw, recording)
+        return _curve(raw, device)
     except (ScanError, InputError) as error:
         raise type(error)(f"{name}: {error}") from None
 
 
-def _curve(raw: _RawCurve, recording: Recording) -> CurveScan:
-    right = calibrate(_joined(raw.blocks), recording.hello.device, recording.calibration)
+def _curve(raw: _RawCurve, device: Device) -> CurveScan:
+    right = calibrate(_joined(raw.blocks), device)
     columns, device = right.columns, right.device
     samples, ids = _marks(raw)
     tangent, normal = _orientation(columns, device)
@@ -228,7 +226,7 @@ def _curve(raw: _RawCurve, recording: Recording) -> CurveScan:
         distance, tangent, normal, samples, ids, raw.boundary, raw.closed,
         columns.get("acceleration"), columns.get("magnetic"), columns.get("time"),
         timed=columns.keys().isdisjoint({"distance", "ticks"}),
-        calibration=recording.calibration.label if recording.calibration and right.used else "",
+        calibration=right.label,
     )  # fmt: skip
     return from_first_node(scan) if raw.closed else scan
 

@@ -1,4 +1,4 @@
-"""Recordings and the field that their vectors are compared with."""
+"""Recordings, the field that their vectors are compared with, and the calibration that corrects them first."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from tracemesh.formats.calibrations import calibrate
 from tracemesh.formats.recordings import Recording
 from tracemesh.geometry.sensing.magnetic_field import field_at_rest
 from tracemesh.geometry.sensing.orientation import ReferenceField
+from tracemesh.wire.calibration import Calibration
 from tracemesh.wire.device import Reference, Samples
 
 
@@ -24,6 +25,20 @@ def with_reference(recording: Recording, field: ReferenceField) -> Recording:
     return replace(recording, hello=recording.hello.model_copy(update={"device": device}))
 
 
+def with_calibration(recording: Recording, calibration: Calibration | None) -> Recording:
+    """The recording with this calibration of its device; None leaves the one that it has.
+
+    Raises InputError where it is another device's.
+    """
+    if calibration is None:
+        return recording
+    device = recording.hello.device
+    if calibration.device != device.id:
+        raise InputError(f"wanted a calibration of the device {device.id}, got one of {calibration.device}")
+    right = device.model_copy(update={"calibration": calibration})
+    return replace(recording, hello=recording.hello.model_copy(update={"device": right}))
+
+
 def measured_reference(recording: Recording) -> ReferenceField:
     """The field by a device at rest; raises InputError where its recording has no vectors, ScanError if it moved."""
     blocks = [m for m in recording.messages if isinstance(m, Samples) and m.acceleration and m.magnetic]
@@ -33,7 +48,7 @@ def measured_reference(recording: Recording) -> ReferenceField:
         name: np.concatenate([np.array(getattr(block, name), float) for block in blocks])
         for name in ("acceleration", "magnetic")
     }
-    right = calibrate(columns, recording.hello.device, recording.calibration).columns
+    right = calibrate(columns, recording.hello.device).columns
     return field_at_rest(right["acceleration"], right["magnetic"])
 
 

@@ -1,11 +1,9 @@
 """Scans from files of either kind: a rawnet or a recording, told apart by their first character."""
 
-from dataclasses import replace
-
 from tracemesh.errors import InputError
 from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import read_recording, scan_from_recordings
-from tracemesh.formats.references import with_reference
+from tracemesh.formats.references import with_calibration, with_reference
 from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.sensing.orientation import ReferenceField
 from tracemesh.wire.calibration import Calibration
@@ -16,11 +14,11 @@ def read_scan(
 ) -> Scan:
     """Scan in a rawnet or in a recording, whose vectors are compared with `field` instead of what its hello names.
 
-    calibration: of the device that made the recording. Raises InputError with `source` and line, and where a field or a
-    calibration is given that changes nothing.
+    calibration: of the device that made the recording, instead of the one that its hello names, if any. Raises
+    InputError with `source` and line, and where a field or a calibration is given that changes nothing.
     """
     if is_recording(text):
-        recording = replace(read_recording(text.split("\n"), source), calibration=calibration)
+        recording = with_calibration(read_recording(text.split("\n"), source), calibration)
         scan = scan_from_recordings([with_reference(recording, field) if field else recording])
         if calibration and not any(curve.calibration for curve in scan.curves):
             raise InputError(f"{source}: its device sent orientations and lengths: {calibration.label} changes nothing")

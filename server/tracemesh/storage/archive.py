@@ -16,10 +16,12 @@ from sqlalchemy.orm import Session as Transaction
 from tracemesh.errors import InputError
 from tracemesh.storage.artifacts import ArtifactStore
 from tracemesh.storage.curves import marks_of, replace_marks
+from tracemesh.storage.devices import add_calibration, choose_calibration, corrected_hello
 from tracemesh.storage.models import ArtifactRow, CurveRow, ReconstructionRow, RecordingRow, new_id
 from tracemesh.storage.recordings import recording_messages
 from tracemesh.storage.sessions import session_row
 from tracemesh.wire.base import Count, Identifier, Message, Name
+from tracemesh.wire.calibration import Calibration
 from tracemesh.wire.resources import Mark, ReconstructionParameters
 
 MANIFEST = "session.json"
@@ -54,6 +56,9 @@ class Manifest(Message):
     name: Name
     curves: list[ArchivedCurve]
     reconstructions: list[ArchivedReconstruction]
+    calibrations: dict[Identifier, Calibration] = Field(
+        default={}, description="recording -> the calibration that was chosen for it"
+    )
     files: dict[str, str] = Field(description="path -> SHA-256 of the content")
 
 
@@ -65,7 +70,8 @@ def write_archive(transaction: Transaction, store: ArtifactStore, session: str, 
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         files = {path: _add(archive, path, content) for path, content in _recordings(transaction, session)}
         files |= {f"artifacts/{d}": _add(archive, f"artifacts/{d}", store.path(d).read_bytes()) for d in digests}
-        manifest = Manifest(name=name, curves=curves, reconstructions=reconstructions, files=files)
+        chosen = _chosen_calibrations(transaction, session)
+        manifest = Manifest(name=name, curves=curves, reconstructions=reconstructions, calibrations=chosen, files=files)
         archive.writestr(MANIFEST, manifest.model_dump_json(indent=1))
 
 
@@ -100,6 +106,7 @@ def restore(
         raise InputError(f"{MANIFEST}: its curves are not those of its recordings")
     if sorted(c.index for c in manifest.curves) != list(range(len(rows))):
         raise InputError(f"{MANIFEST}: its curves are not numbered 0, 1, 2, ...")
+    _choose_calibrations(transaction, session, manifest.calibrations)
     for curve in manifest.curves:
         row = rows[curve.recording, curve.number]
         row.boundary, row.closed, row.removed = curve.boundary, curve.closed, curve.removed
@@ -150,6 +157,20 @@ def _recordings(transaction: Transaction, session: str) -> Iterator[tuple[str, b
     for row in transaction.scalars(query):
         lines = [row.hello, *recording_messages(transaction, row.key)]
         yield f"recordings/{row.id}.ndjson", b"".join(line + b"\n" for line in lines)
+
+
+def _chosen_calibrations(transaction: Transaction, session: str) -> dict[str, Calibration]:
+    rows = transaction.scalars(select(RecordingRow).where(RecordingRow.session_id == session))
+    devices = {row.id: corrected_hello(transaction, row).device for row in rows}
+    return {name: device.calibration for name, device in devices.items() if device.calibration is not None}
+
+
+def _choose_calibrations(transaction: Transaction, session: str, chosen: Mapping[str, Calibration]) -> None:
+    """What is archived is stored here, too, under whatever number is next."""
+    for row in transaction.scalars(select(RecordingRow).where(RecordingRow.session_id == session)):
+        calibration = chosen.get(row.id)
+        stored = add_calibration(transaction, calibration) if calibration else None
+        choose_calibration(transaction, row, stored.version if stored else None)
 
 
 def _rows_by_origin(transaction: Transaction, session: str) -> dict[tuple[str, int], CurveRow]:

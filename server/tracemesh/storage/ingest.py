@@ -7,6 +7,7 @@ from sqlalchemy import bindparam, delete, func, insert, select, update
 from sqlalchemy.orm import Session
 
 from tracemesh.errors import Refused
+from tracemesh.storage.devices import add_calibration, corrected_hello, seen
 from tracemesh.storage.models import CurveRow, MarkRow, MessageRow, RecordingRow, SessionRow, new_id
 from tracemesh.storage.states import CurveState, RecordingState, SessionState
 from tracemesh.wire.base import PROTOCOL_VERSION
@@ -97,11 +98,12 @@ def open_recording(session: Session, hello: Hello, payload: bytes) -> RecordingS
     """
     if PROTOCOL_VERSION not in hello.versions:
         raise Refused("version", f"this server speaks version {PROTOCOL_VERSION}, the device speaks {hello.versions}")
+    seen(session, hello.device)
     row = _find(session, hello) or _create(session, hello, payload)
     return RecordingState(
         key=row.key,
         session=_session_state(session, row.session_id),
-        hello=Hello.model_validate_json(row.hello),
+        hello=corrected_hello(session, row),
         next_seq=row.next_seq,
         committed=row.next_seq,
         bytes=row.bytes,
@@ -126,6 +128,8 @@ def _create(session: Session, hello: Hello, payload: bytes) -> RecordingRow:
     elif session.get(SessionRow, identifier) is None:
         raise Refused("unknown", f"there is no session {identifier}")
     row = RecordingRow(id=hello.recording, session_id=identifier, hello=payload, made_session=made)
+    if hello.device.calibration is not None:
+        row.calibration = add_calibration(session, hello.device.calibration).version
     session.add(row)
     session.flush()
     return row

@@ -56,6 +56,8 @@ class SessionRow(Base):
 class RecordingRow(Base):
     """What one device sent into one session; `next_seq` messages of it are committed.
 
+    `calibration` is the version of its device's calibration that corrects it, if one was chosen.
+
     A key is never used twice: whoever holds the key of a deleted recording must not write into another one.
     """
 
@@ -70,6 +72,30 @@ class RecordingRow(Base):
     next_seq: Mapped[int] = mapped_column(Long, default=0)
     bytes: Mapped[int] = mapped_column(Long, default=0)
     created: Mapped[datetime] = mapped_column(UtcTime, default=now)
+    calibration: Mapped[int | None]
+
+
+class DeviceRow(Base):
+    """A device that sent something or was calibrated; `last_version` is the highest number of its calibrations."""
+
+    __tablename__ = "devices"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(64))
+    name: Mapped[str] = mapped_column(String(200))
+    first_seen: Mapped[datetime] = mapped_column(UtcTime)
+    last_seen: Mapped[datetime] = mapped_column(UtcTime, index=True)
+    last_version: Mapped[int]
+
+
+class CalibrationRow(Base):
+    """A calibration of a device as JSON; versions are counted from 1, none is used twice."""
+
+    __tablename__ = "calibrations"
+
+    device_id: Mapped[str] = mapped_column(ForeignKey("devices.id", ondelete="CASCADE"), primary_key=True)
+    version: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    payload: Mapped[bytes] = mapped_column(LargeBinary)
 
 
 class MessageRow(Base):

@@ -6,10 +6,11 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import NotFound
+from tracemesh.storage.devices import choose_calibration
 from tracemesh.storage.models import MessageRow, RecordingRow
 from tracemesh.storage.sessions import session_row
 from tracemesh.wire.device import Hello
-from tracemesh.wire.resources import RecordingSummary
+from tracemesh.wire.resources import RecordingSummary, RecordingUpdate
 
 PAGE = 200
 """Messages read at once."""
@@ -29,6 +30,16 @@ def recording_row(transaction: Transaction, session: str, identifier: str) -> Re
     if row is None:
         raise NotFound(f"there is no recording {identifier} in session {session}")
     return row
+
+
+def update_recording(
+    transaction: Transaction, session: str, identifier: str, change: RecordingUpdate
+) -> RecordingSummary:
+    """Change what the update names; raises NotFound."""
+    row = recording_row(transaction, session, identifier)
+    if "calibration" in change.model_fields_set:
+        choose_calibration(transaction, row, change.calibration)
+    return summary(row)
 
 
 def recording_messages(transaction: Transaction, key: int, first: int = 0) -> Iterator[bytes]:
@@ -51,4 +62,5 @@ def summary(row: RecordingRow) -> RecordingSummary:
         messages=row.next_seq,
         bytes=row.bytes,
         created=row.created,
+        calibration=row.calibration,
     )

@@ -8,10 +8,11 @@ from tracemesh.errors import ScanError
 from tracemesh.formats.recordings import Recording, scan_from_recordings
 from tracemesh.geometry.scan import Scan
 from tracemesh.storage.curves import curve_rows, marks_of
+from tracemesh.storage.devices import corrected_hello
 from tracemesh.storage.models import CurveRow, RecordingRow
 from tracemesh.storage.recordings import recording_messages
 from tracemesh.storage.sessions import session_row
-from tracemesh.wire.device import CurveEnd, CurveStart, Hello, NodeMark, Recorded, Samples, from_device
+from tracemesh.wire.device import CurveEnd, CurveStart, NodeMark, Recorded, Samples, from_device
 
 Blocks = dict[int, list[Samples]]
 """Sample blocks of a recording by the number of their curve."""
@@ -51,4 +52,4 @@ def _edited(transaction: Transaction, row: CurveRow, blocks: list[Samples]) -> R
         CurveEnd(seq=0, curve=0, closed=row.closed),
     ]
     numbered = [message.model_copy(update={"seq": seq, "curve": 0}) for seq, message in enumerate(messages)]
-    return Recording(Hello.model_validate_json(recording.hello), numbered)
+    return Recording(corrected_hello(transaction, recording), numbered)

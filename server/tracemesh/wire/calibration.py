@@ -110,6 +110,7 @@ class CalibrationCreate(Message):
 
     calibration: Calibration | None = None
     readings: CalibrationReadings | None = None
+    kind: Identifier = Field(default="unknown", description="of the device, if the server does not know it yet")
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:

@@ -16,6 +16,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, TypeAdapter, model_validator
 
 from tracemesh.wire.base import PROTOCOL_VERSION, Count, Identifier, Message, Name, Quaternion, UnitQuaternion, Vector
+from tracemesh.wire.calibration import Calibration
 
 MAX_SAMPLES = 2000
 """Most samples that one message may carry."""
@@ -47,6 +48,15 @@ class Device(Message):
         description="[w, x, y, z]: turns the axes (tangent, normal, B) into the device's own axes",
     )
     reference: Reference = Reference()
+    calibration: Calibration | None = Field(
+        default=None, description="of this device, chosen by whoever records; the readings are as measured all the same"
+    )
+
+    @model_validator(mode="after")
+    def _calibrated_itself(self) -> Self:
+        if self.calibration is not None and self.calibration.device != self.id:
+            raise ValueError(f"wanted a calibration of the device {self.id}, got one of {self.calibration.device}")
+        return self
 
 
 class Hello(Message):
@@ -66,6 +76,9 @@ class Welcome(Message):
     version: int
     session: Identifier
     next_seq: Count = Field(description="number of the first message that the server does not have")
+    calibration: Name | None = Field(
+        default=None, description="the newest one of this device that the server has and the recording does not use"
+    )
 
 
 class CurveStart(Message):

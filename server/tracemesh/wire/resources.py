@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from tracemesh.wire.base import Count, Identifier, Message, Name, Vector
+from tracemesh.wire.calibration import Version
 from tracemesh.wire.device import Device
 
 
@@ -138,6 +139,13 @@ class RecordingSummary(Message):
     messages: Count
     bytes: Count
     created: datetime
+    calibration: Version | None = Field(default=None, description="of its device, applied when it is reconstructed")
+
+
+class RecordingUpdate(Message):
+    """PATCH /sessions/{session}/recordings/{recording}; absent fields stay."""
+
+    calibration: Version | None = Field(default=None, description="version of its device's calibration; null: none")
 
 
 class ReconstructionParameters(Message):

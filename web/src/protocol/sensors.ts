@@ -34,7 +34,14 @@ export const motionSensors: Source = {
   kind: "phone",
   label: "Use this device's sensors",
   hint: "Lay the phone on the surface, screen outwards, and lead it along the curve with its top edge first.",
-  device: { kind: "phone", name: "phone", wheel: null, mounting: [0.5, 0.5, 0.5, 0.5], reference: REFERENCE },
+  device: {
+    kind: "phone",
+    name: "phone",
+    wheel: null,
+    mounting: [0.5, 0.5, 0.5, 0.5],
+    reference: REFERENCE,
+    calibration: null,
+  },
   missing,
   start: startSensor,
 };

@@ -35,6 +35,7 @@ export const morphorider: Source = {
     wheel: { circumference: CIRCUMFERENCE, ticks_per_turn: TICKS_PER_TURN },
     mounting: [1, 0, 0, 0],
     reference: REFERENCE,
+    calibration: null,
   },
   missing: (window) => ("serial" in window.navigator ? "" : "This browser cannot open serial ports; Chrome can."),
   start: startMorphorider,

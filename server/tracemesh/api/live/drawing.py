@@ -5,10 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracemesh.errors import ScanError
+from tracemesh.formats.calibrations import corrections, with_right_wheel
 from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import Floats
 from tracemesh.geometry.sensing.odometry import COUNTER_RANGE, NOMINAL_SPEED
 from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
+from tracemesh.wire.base import Vector
 from tracemesh.wire.device import Device, Samples
 
 SPACING = 0.003
@@ -20,7 +22,8 @@ class CurveDrawing:
 
     def __init__(self, device: Device, boundary: bool) -> None:
         """An empty curve that starts at the origin."""
-        self.device = device
+        self.device = with_right_wheel(device)
+        self._corrections = corrections(device)
         self.boundary = boundary
         self.closed = False
         self.ended = False
@@ -93,10 +96,15 @@ class CurveDrawing:
                 return frames_from_quaternions(np.array(block.quaternion), mounting)[:, :, 0]
             known = self.device.reference
             reference = ReferenceField(known.acceleration, known.magnetic)
-            vectors = np.array(block.acceleration), np.array(block.magnetic)
+            vectors = self._vectors(block.acceleration, "acceleration"), self._vectors(block.magnetic, "magnetic")
             return frames_from_vectors(*vectors, reference, mounting)[:, :, 0]
         except ScanError:
             return np.tile(np.zeros(3) if self._tangent is None else self._tangent, (block.count, 1))
+
+    def _vectors(self, column: Sequence[Vector] | None, name: str) -> Floats:
+        """A sensor's vectors (n, 3), corrected if its device is calibrated."""
+        vectors = np.array(column, float)
+        return self._corrections[name](vectors) if name in self._corrections else vectors
 
     def _steps(self, block: Samples) -> Floats:
         """Distance (n,) m from the sample before."""

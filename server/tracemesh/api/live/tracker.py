@@ -11,9 +11,10 @@ from tracemesh.api.live.drawing import CurveDrawing, flat
 from tracemesh.geometry.scan import Floats
 from tracemesh.jobs.attached import SolvedNetwork
 from tracemesh.storage.curves import curve_rows, marks_of
+from tracemesh.storage.devices import corrected_hello
 from tracemesh.storage.models import RecordingRow
 from tracemesh.storage.scans import sample_blocks
-from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Recorded, Samples
+from tracemesh.wire.device import CurveEnd, CurveStart, Device, NodeMark, Recorded, Samples
 from tracemesh.wire.live import LiveCurve, LiveCurveEnd, LiveCurveStart, LiveNetwork, LiveNode, LivePoints
 from tracemesh.wire.resources import NodePosition
 
@@ -116,7 +117,7 @@ class SessionTracker:
         tracker = SessionTracker()
         recordings = transaction.scalars(select(RecordingRow).where(RecordingRow.session_id == session)).all()
         tracker._next_seq = {row.key: row.next_seq for row in recordings}
-        devices = {row.key: Hello.model_validate_json(row.hello).device for row in recordings}
+        devices = {row.key: corrected_hello(transaction, row).device for row in recordings}
         blocks = {key: sample_blocks(transaction, key) for key in devices}
         for row in curve_rows(transaction, session):
             drawing = CurveDrawing(devices[row.recording_key], row.boundary)

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from tracemesh.api.services import Services, UseServices
 from tracemesh.api.sockets import first_to_end
 from tracemesh.errors import Refused
+from tracemesh.storage.devices import proposal
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.base import PROTOCOL_VERSION
 from tracemesh.wire.device import Ack, ErrorMessage, Hello, Recorded, Welcome, from_device
@@ -67,12 +68,16 @@ class _Connection:
             raise Refused("limit", f"{self._services.settings.max_devices} devices are connected already")
         self._state = await self._services.recorder.open(hello, payload, self)
         self._services.hub.connected(self._state)
-        await self._send(
-            Welcome(version=PROTOCOL_VERSION, session=self._state.session.id, next_seq=self._state.next_seq)
-        )
+        known = await asyncio.to_thread(self._known_calibration, self._state.key)
+        session, next_seq = self._state.session.id, self._state.next_seq
+        await self._send(Welcome(version=PROTOCOL_VERSION, session=session, next_seq=next_seq, calibration=known))
         log.info("recording %s: %s is here, at message %d", hello.recording, hello.device.kind, self._state.next_seq)
         await asyncio.to_thread(self._services.runner.prepare)
         await first_to_end(self._read(self._state), self._answer())
+
+    def _known_calibration(self, key: int) -> str | None:
+        with self._services.database.read() as transaction:
+            return proposal(transaction, key)
 
     async def refuse(self, reason: Refused) -> None:
         """Say why, and close."""

@@ -12,7 +12,7 @@ from tracemesh.storage import recordings
 from tracemesh.storage.models import derived_id, new_id
 from tracemesh.storage.recordings import recording_messages, recording_row
 from tracemesh.wire.base import Identifier
-from tracemesh.wire.resources import RecordingSummary
+from tracemesh.wire.resources import RecordingSummary, RecordingUpdate
 
 router = APIRouter(prefix="/sessions/{session}/recordings", tags=["recordings"])
 
@@ -30,6 +30,17 @@ def export(session: Identifier, recording: Identifier, services: UseServices) ->
         row = recording_row(transaction, session, recording)
     headers = {"Content-Disposition": f'attachment; filename="{recording}.ndjson"'}
     return StreamingResponse(_lines(services, row.key, row.hello), headers=headers, media_type="application/x-ndjson")
+
+
+@router.patch("/{recording}")
+def update(
+    session: Identifier, recording: Identifier, change: RecordingUpdate, services: UseServices
+) -> RecordingSummary:
+    """Choose the calibration that corrects it from now on; what was sent stays as it is."""
+    with services.database.write() as transaction:
+        changed = recordings.update_recording(transaction, session, recording, change)
+    services.edited(session)
+    return changed
 
 
 @router.post("", status_code=201, openapi_extra=file_body("text/plain", "application/x-ndjson"))
