@@ -42,6 +42,9 @@ class Settings(BaseSettings):
     )
     job_slots: int = Field(default=1, ge=1, le=64, description="reconstructions at once, each in a process of its own")
     max_devices: int = Field(default=1000, ge=1, description="devices connected at once")
+    max_device_rate: int = Field(
+        default=1000, ge=1, description="messages a second that are read from one device, every 4 kB counting as one"
+    )
     max_session_bytes: int = Field(default=2**31, ge=1, description="most bytes of messages in one session")
     max_upload_bytes: int = Field(default=2**28, ge=1, description="most bytes of an uploaded file")
 

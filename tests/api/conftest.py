@@ -18,6 +18,7 @@ import uvicorn
 from websockets.sync.client import ClientConnection, connect
 
 from tracemesh.api.app import create_app
+from tracemesh.api.websocket import SteadyReading
 from tracemesh.settings import Settings
 
 
@@ -95,7 +96,7 @@ def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[
     def start(**options: Any) -> RunningServer:
         settings = Settings(**{"data_dir": tmp_path_factory.mktemp("data"), "port": free_port(), **options})
         config = uvicorn.Config(
-            create_app(settings), port=settings.port, log_level="warning", ws="websockets-sansio", lifespan="on"
+            create_app(settings), port=settings.port, log_level="warning", ws=SteadyReading, lifespan="on"
         )
         server = uvicorn.Server(config)
         thread = threading.Thread(target=server.run)

@@ -20,6 +20,8 @@ from tracemesh.storage.sessions import delete_session
 from tracemesh.storage.states import RecordingState, SessionState
 from tracemesh.wire.device import Hello, Recorded
 
+GATHER = 0.01
+"""s between the beginnings of two commits, at least: each costs about the same, however many messages it holds."""
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 
@@ -159,13 +161,17 @@ class Recorder:
         return await asyncio.get_running_loop().run_in_executor(self._writer, transaction)
 
     async def _run(self) -> None:
+        loop = asyncio.get_running_loop()
         while not self._closing or self._batch.group.reached:
             await self._wake.wait()
             self._wake.clear()
             batch, self._batch = self._batch, _Batch()
+            began = loop.time()
             if batch.group.reached:
                 await self._commit(batch.group)
             batch.done.set()
+            if not self._closing:
+                await asyncio.sleep(began + GATHER - loop.time())
         self._batch.done.set()
 
     async def _commit(self, group: Group) -> None:

@@ -1,10 +1,12 @@
 """Runs the service in one process."""
 
+import gc
 import logging
 
 import uvicorn
 
 from tracemesh.api.app import create_app
+from tracemesh.api.websocket import SteadyReading
 from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import open_artifacts
@@ -14,6 +16,8 @@ MAX_MESSAGE = 4 * 2**20
 """Most bytes of one message on a socket."""
 DRAIN = 5
 """s that open requests have to end when the server stops."""
+COLLECT_AFTER = (50_000, 20, 100)
+"""New objects until the garbage collector looks through the youngest; how often it does before it looks further."""
 
 
 def serve(settings: Settings) -> None:
@@ -28,7 +32,7 @@ def serve(settings: Settings) -> None:
         create_app(settings),
         host=settings.host,
         port=settings.port,
-        ws="websockets-sansio",
+        ws=SteadyReading,
         ws_max_size=MAX_MESSAGE,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=DRAIN,
@@ -36,10 +40,18 @@ def serve(settings: Settings) -> None:
         log_config=None,
         server_header=False,
     )
+    _collect_garbage_seldom()
     try:
         uvicorn.Server(configuration).run()
     except SystemExit:  # uvicorn's word for an address that it could not have; its log says why
         raise ResourceError(f"cannot listen at {settings.host}:{settings.port}") from None
+
+
+def _collect_garbage_seldom() -> None:
+    """Everybody waits while the collector looks: spare it what lives as long as the process, and messages."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*COLLECT_AFTER)
 
 
 def _prepare(settings: Settings) -> None:

@@ -115,7 +115,7 @@ class Samples(Message):
     @property
     def count(self) -> int:
         """Number of samples in the block."""
-        return next((len(v) for n in _COLUMNS if (v := getattr(self, n)) is not None), 0)
+        return len(self.acceleration or self.quaternion or self.tangent or ())
 
     def columns(self) -> dict[str, list[object]]:
         """The columns that are present, by name."""
@@ -123,8 +123,8 @@ class Samples(Message):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        lengths = {name: len(column) for name, column in self.columns().items()}
-        if not lengths or len(set(lengths.values())) > 1 or not 1 <= self.count <= MAX_SAMPLES:
+        lengths = {n: len(v) for n, v in self.__dict__.items() if type(v) is list}
+        if not lengths or len(set(lengths.values())) > 1 or not 1 <= next(iter(lengths.values())) <= MAX_SAMPLES:
             raise ValueError(f"wanted columns of one length between 1 and {MAX_SAMPLES}, got {lengths}")
         vectors = self.acceleration is not None and self.magnetic is not None
         frames = self.tangent is not None and self.normal is not None

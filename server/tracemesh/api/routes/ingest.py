@@ -6,6 +6,7 @@ import logging
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
 
+from tracemesh.api.pace import Pace
 from tracemesh.api.services import Services, UseServices
 from tracemesh.api.sockets import first_to_end
 from tracemesh.errors import Refused
@@ -18,6 +19,8 @@ MAX_UNACKNOWLEDGED = 512
 """Messages of one device that wait for the disk before no more are read from it."""
 HELLO_TIMEOUT = 10.0
 """s in which a device has to say hello."""
+SHORTEST_PAUSE = 0.01
+"""s; a shorter one waits until it has grown."""
 router = APIRouter()
 log = logging.getLogger(__name__)
 
@@ -98,6 +101,7 @@ class _Connection:
 
     async def _read(self, state: RecordingState) -> None:
         recorder = self._services.recorder
+        pace = Pace(self._services.settings.max_device_rate)
         while True:
             payload = await self._receive()
             message = _parsed(payload)
@@ -106,6 +110,8 @@ class _Connection:
             recorder.accept(state, message, payload)
             if state.next_seq - state.committed > MAX_UNACKNOWLEDGED:
                 await recorder.flush()
+            if (pause := pace.take(len(payload))) > SHORTEST_PAUSE:
+                await asyncio.sleep(pause)
 
     async def _answer(self) -> None:
         while self.failure is None:
