@@ -1,132 +1,153 @@
-"""Devices on one server: how long an acknowledgement, which comes after the durable commit, takes."""
+"""Devices on one server: how long an acknowledgement, which comes after the durable commit, and the live view take."""
 
 import asyncio
 import json
+import os
+import socket
 import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.error import URLError
 from urllib.request import urlopen
 
 import numpy as np
-from websockets.asyncio.client import ClientConnection, connect
+import uvloop
+from websockets.asyncio.client import connect as connect_to
 
 from benchmarks.data import Data
+from benchmarks.load import BATCH, PERIOD, RATE, Device, Load, connect, send
 from benchmarks.table import Cell, Column, Table
 
-RATE, BATCH = 100, 10
-"""Samples a second of each device, and samples a message."""
-PORT = 8799
+BEARABLE = 100.0
+"""ms; acknowledgements of a load that is not too much take no longer, but for one in a hundred."""
+SEARCH_SECONDS = 15.0
+"""s of each run that only looks for the limit."""
+SETTLE = 3.0
+"""s that the server's workers get to start, before anything is measured."""
 
 COLUMNS = (
     Column("devices", "d"),
+    Column("s", ".0f"),
     Column("messages/s", ".0f"),
     *(Column(f"ack {name}, ms", ".1f") for name in ("p50", "p95", "p99", "max")),
+    *(Column(f"live view {name}, ms", ".1f") for name in ("p50", "p95")),
     Column("lost", "d"),
     Column("server, s of processor a s", ".2f"),
-    Column("server memory, MB", ".0f"),
+    *(Column(f"memory {when}, MB", ".0f") for when in ("after a quarter", "at the end")),
 )
 NOTES = (
     f"""Every device sends {RATE} samples a second (acceleration, magnetic field, ticks, time) in messages of {BATCH} to
     one server process on SQLite, synchronous=FULL; the load generator shares the machine. Ack: from sending a message
-    to its acknowledgement. Lost: messages that the server does not have at the end.""",
+    to its acknowledgement. Live view: from sending a message to its points' arrival at somebody who watches, where they
+    come 60 times a second. Lost: messages that the server does not have at the end.""",
 )
 
 
-def ingest(data: Data, devices: tuple[int, ...] = (100, 300, 500), seconds: float = 20.0) -> Table:
-    """Table of one row per number of devices. `data` is not needed."""
-    rows = tuple(_row(count, seconds) for count in devices)
-    return Table("ingest", "Devices on one server", COLUMNS, rows, NOTES)
+def ingest(data: Data, devices: tuple[int, ...] = (100, 300, 500), seconds: float = 60.0, further: int = 100) -> Table:
+    """Table of one row per number of devices, then so many more in each shorter run until it is too much.
+
+    `data` is not needed; `further` = 0 does not look for the limit.
+    """
+    rows = [_row(count, seconds) for count in devices]
+    while further and _bearable(rows[-1]):
+        rows.append(_row(int(rows[-1][0] or 0) + further, SEARCH_SECONDS))
+    limit = max((int(row[0] or 0) for row in rows if _bearable(row)), default=0)
+    found = f"Limit found: {limit} devices, with 99 of 100 acknowledgements within {BEARABLE:.0f} ms and none lost."
+    return Table("ingest", "Devices on one server", COLUMNS, tuple(rows), (*NOTES, found))
 
 
 @dataclass
-class Load:
-    """What the devices saw: seconds until each acknowledgement, and how many messages were acknowledged."""
+class Seen:
+    """What was measured while the devices sent: waits in s, processor time and elapsed time in s, memory in MB."""
 
-    waits: list[float] = field(default_factory=list)
-    acknowledged: int = 0
+    load: Load = field(default_factory=Load)
+    live: list[float] = field(default_factory=list)
+    busy: float = 0.0
+    elapsed: float = 0.0
+    memory: list[float] = field(default_factory=list)
+
+
+def _bearable(row: tuple[Cell, ...]) -> bool:
+    figures = dict(zip((column.title for column in COLUMNS), row, strict=True))
+    p99, lost = figures["ack p99, ms"], figures["lost"]
+    return isinstance(p99, float) and p99 <= BEARABLE and lost == 0
 
 
 def _row(devices: int, seconds: float) -> tuple[Cell, ...]:
-    messages = round(seconds * RATE / BATCH)
+    messages = round(seconds / PERIOD) + 1
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(PORT), "--data-dir", folder]
-        server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        port = _free_port()
+        command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", folder]
+        environment = {**os.environ, "TRACEMESH_MAX_DEVICES": "100000"}
+        server = subprocess.Popen(command, stderr=subprocess.DEVNULL, env=environment)
         try:
-            _wait_for_server()
-            load, busy, elapsed = asyncio.run(_all_devices(server.pid, devices, messages))
-            memory = _memory(server.pid)
+            _wait_for_server(port)
+            seen = uvloop.run(_measure(server.pid, port, devices, messages))
         finally:
             server.terminate()
             server.wait()
-    quantiles = (float(q) for q in 1000 * np.quantile(load.waits, (0.5, 0.95, 0.99, 1.0)))
-    lost = devices * (messages + 1) - load.acknowledged
-    return (devices, len(load.waits) / elapsed, *quantiles, lost, busy / elapsed, memory)
+    acks = (float(q) for q in 1000 * np.quantile(seen.load.waits, (0.5, 0.95, 0.99, 1.0)))
+    live = (float(q) for q in 1000 * np.quantile(seen.live, (0.5, 0.95)))
+    lost = devices * messages - seen.load.acknowledged
+    rate, busy = len(seen.load.waits) / seen.elapsed, seen.busy / seen.elapsed
+    return (devices, seconds, rate, *acks, *live, lost, busy, seen.memory[0], seen.memory[-1])
 
 
-async def _all_devices(server: int, devices: int, messages: int) -> tuple[Load, float, float]:
-    """Connect all, then begin: what they saw, the server's processor time and the time that passed, s."""
-    load, ready, begin = Load(), asyncio.Semaphore(0), asyncio.Event()
-    tasks = [asyncio.create_task(_device(number, messages, load, ready, begin)) for number in range(devices)]
-    for _ in tasks:
-        await ready.acquire()
+async def _measure(server: int, port: int, devices: int, messages: int) -> Seen:
+    """Connect all, then let them send."""
+    seen = Seen()
+    connected = await connect(devices, port, seen.load)
+    watching = asyncio.create_task(_watch(connected[0], port, seen.live))
+    await asyncio.sleep(SETTLE)
+    sampling = asyncio.create_task(_sample_memory(server, PERIOD * messages / 4, seen.memory))
     busy, start = _processor_time(server), time.perf_counter()
-    begin.set()
-    await asyncio.gather(*tasks)
-    return load, _processor_time(server) - busy, time.perf_counter() - start
+    await send(connected, messages)
+    seen.busy, seen.elapsed = _processor_time(server) - busy, time.perf_counter() - start
+    seen.memory.append(_memory(server))
+    for task in (watching, sampling):
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+    for device in connected:
+        device.close()
+    return seen
 
 
-async def _device(number: int, messages: int, load: Load, ready: asyncio.Semaphore, begin: asyncio.Event) -> None:
-    chance = np.random.default_rng(number)
-    await asyncio.sleep(chance.uniform(0, 2))
-    async with connect(f"ws://127.0.0.1:{PORT}/api/v1/ingest", compression=None, open_timeout=60) as socket:
-        hello = {"type": "hello", "recording": f"r{number}", "device": {"id": "d", "kind": "k", "wheel": {}}}
-        await socket.send(json.dumps(hello))
-        await socket.recv()
-        ready.release()
-        await begin.wait()
-        await asyncio.sleep(chance.uniform(0, BATCH / RATE))
-        sent: list[float] = []
-        listening = asyncio.create_task(_listen(socket, sent, messages, load))
-        await _send(socket, sent, messages, chance)
-        await listening
+async def _watch(device: Device, port: int, waits: list[float]) -> None:
+    """Watch a device's session: every sample that it sends is one more point."""
+    seen = 0
+    session = await device.session
+    async with connect_to(f"ws://127.0.0.1:{port}/api/v1/sessions/{session}/live", max_size=None) as watching:
+        async for text in watching:
+            message = json.loads(text)
+            if message["type"] == "live.points":
+                now = time.perf_counter()
+                newest = (message["first"] + len(message["positions"]) // 3) // BATCH
+                waits += [now - sent for sent in device.sent[seen + 1 : newest + 1]]
+                seen = newest
 
 
-async def _send(socket: ClientConnection, sent: list[float], messages: int, chance: np.random.Generator) -> None:
-    vectors = {name: chance.uniform(-1, 1, (BATCH, 3)).round(4).tolist() for name in ("acceleration", "magnetic")}
-    columns = json.dumps({**vectors, "time": [0.0] * BATCH, "ticks": [[1, 2]] * BATCH})[1:]
-    start = time.perf_counter()
-    for number in range(messages + 1):
-        await asyncio.sleep(max(0.0, start + number * BATCH / RATE - time.perf_counter()))
-        sent.append(time.perf_counter())
-        if number == 0:
-            await socket.send('{"type":"curve.start","seq":0,"curve":0}')
-        else:
-            head = f'{{"type":"samples","seq":{number},"curve":0,"first_sample":{(number - 1) * BATCH},'
-            await socket.send(head + columns)
+async def _sample_memory(server: int, interval: float, sampled: list[float]) -> None:
+    while True:
+        await asyncio.sleep(interval)
+        sampled.append(_memory(server))
 
 
-async def _listen(socket: ClientConnection, sent: list[float], messages: int, load: Load) -> None:
-    next_seq = 0
-    async for text in socket:
-        answer, now = json.loads(text), time.perf_counter()
-        if answer["type"] != "ack":
-            raise RuntimeError(text)
-        load.waits += [now - sent[seq] for seq in range(next_seq, answer["seq"] + 1)]
-        load.acknowledged += answer["seq"] + 1 - next_seq
-        next_seq = answer["seq"] + 1
-        if next_seq == messages + 1:
-            return
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
-def _wait_for_server() -> None:
+def _wait_for_server(port: int) -> None:
     deadline = time.monotonic() + 30
     while True:
         try:
-            urlopen(f"http://127.0.0.1:{PORT}/healthz").close()
+            urlopen(f"http://127.0.0.1:{port}/healthz").close()
             return
         except URLError:
             if time.monotonic() > deadline:
