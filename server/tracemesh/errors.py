@@ -11,6 +11,7 @@ TracemeshError
     ├── NotFound
     ├── Conflict
     ├── Unavailable       another service that is needed does not answer: asking again later may help
+    │   └── ClusterAway   the scheduler of the cluster that runs jobs
     └── Refused           a device's message that is not taken: carries the code that the protocol has for it
 """
 
@@ -57,6 +58,10 @@ class Conflict(ResourceError):  # noqa: N818 - HTTP's own words
 
 class Unavailable(ResourceError):  # noqa: N818 - HTTP's own words
     """Another service that is needed does not answer, or answers wrongly; the message says which."""
+
+
+class ClusterAway(Unavailable):
+    """The scheduler of the cluster that runs jobs does not answer, or has no workers."""
 
 
 class Refused(ResourceError):  # noqa: N818 - the protocol's own word

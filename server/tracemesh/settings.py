@@ -5,6 +5,7 @@ import re
 import tomllib
 from pathlib import Path
 from typing import Any, Self
+from urllib.parse import urlsplit
 
 from platformdirs import user_data_path
 from pydantic import Field, SecretStr, field_validator, model_validator
@@ -40,7 +41,12 @@ class Settings(BaseSettings):
     token: SecretStr | None = Field(
         default=None, description=f"secret that every request must bring, {MIN_TOKEN} characters or more"
     )
+    executor: str = Field(
+        default="embedded", description="where jobs run: embedded, in processes of the server, or dask://HOST:PORT"
+    )
     job_slots: int = Field(default=1, ge=1, le=64, description="reconstructions at once, each in a process of its own")
+    job_timeout: int = Field(default=3600, ge=1, description="most seconds of one reconstruction")
+    job_memory: int = Field(default=2**32, ge=2**29, description="most bytes of an embedded job's process")
     max_devices: int = Field(default=1000, ge=1, description="devices connected at once")
     max_device_rate: int = Field(
         default=1000, ge=1, description="messages a second that are read from one device, every 4 kB counting as one"
@@ -68,6 +74,25 @@ class Settings(BaseSettings):
         if url and not re.fullmatch(r"s3://[^/]+(/.*)?", url):
             raise ValueError(f"wanted s3://BUCKET, s3://BUCKET/PREFIX or nothing, got {url}")
         return url
+
+    @field_validator("executor")
+    @classmethod
+    def _known_executor(cls, executor: str) -> str:
+        if executor != "embedded" and not re.fullmatch(r"dask://(\[[0-9a-fA-F:]+\]|[^/:\[\]]+):\d{1,5}", executor):
+            raise ValueError(f"wanted embedded or dask://HOST:PORT, got {executor!r}")
+        return executor
+
+    @model_validator(mode="after")
+    def _within_reach_of_workers(self) -> Self:
+        """SQLite's locks hold on one machine only: workers on others would spoil the file."""
+        if self.cluster_address is None or not self.resolved_database_url.startswith("sqlite"):
+            return self
+        if urlsplit(self.cluster_address).hostname not in LOOPBACK:
+            raise ValueError(
+                f"workers of {self.executor} cannot share an SQLite database: set TRACEMESH_DATABASE_URL to "
+                "postgresql://USER:PASSWORD@HOST/NAME, or use a scheduler on 127.0.0.1"
+            )
+        return self
 
     @model_validator(mode="after")
     def _closed_off_loopback(self) -> Self:
@@ -97,6 +122,11 @@ class Settings(BaseSettings):
             return f"sqlite:///{self.data_dir / 'tracemesh.db'}"
         scheme, separator, rest = self.database_url.partition("://")
         return f"postgresql+pg8000{separator}{rest}" if scheme in ("postgres", "postgresql") else self.database_url
+
+    @property
+    def cluster_address(self) -> str | None:
+        """The dask scheduler as dask writes it; None for embedded jobs."""
+        return None if self.executor == "embedded" else self.executor.replace("dask://", "tcp://", 1)
 
     @property
     def artifact_dir(self) -> Path:

@@ -69,3 +69,16 @@ def test_a_file_that_cannot_be_right_is_named(
     monkeypatch.setenv("TRACEMESH_SETTINGS", str(file))
     with pytest.raises((InputError, ValidationError), match=wanted):
         Settings()
+
+
+@pytest.mark.parametrize("executor", ["", "dask", "dask://", "dask://host", "dask://host:port", "tcp://host:8786"])
+def test_an_executor_that_is_none_is_refused(executor: str) -> None:
+    with pytest.raises(ValidationError, match="wanted embedded or dask://HOST:PORT"):
+        Settings(executor=executor)
+
+
+def test_workers_elsewhere_do_not_share_a_file() -> None:
+    with pytest.raises(ValidationError, match="cannot share an SQLite database"):
+        Settings(executor="dask://10.0.0.5:8786")
+    assert Settings(executor="dask://localhost:8786").cluster_address == "tcp://localhost:8786"
+    assert Settings(executor="dask://10.0.0.5:8786", database_url="postgresql://u@h/d").cluster_address

@@ -1,113 +1,38 @@
-"""Jobs on embedded slots, with the real work, the real processes and kill -9."""
+"""Jobs with the real work on real processes, of the server's own and of a dask cluster; kill -9 included."""
 
 import os
 import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 from sqlalchemy import update
 
+from tests.jobs.support import LONG, kill, look, queue, row, until, wait, wait_until_it_works, workers
 from tracemesh.formats.meshes import read_mesh
 from tracemesh.formats.networks import read_network
-from tracemesh.formats.rawnet import read_rawnet
-from tracemesh.formats.recordings import recording_from_scan
 from tracemesh.jobs.runner import JobRunner
+from tracemesh.jobs.slot import Slot
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import artifact_row, open_artifacts
 from tracemesh.storage.database import Database
-from tracemesh.storage.ingest import Group, commit, open_recording
-from tracemesh.storage.models import ReconstructionRow
-from tracemesh.storage.reconstructions import create_reconstruction, get_reconstruction, request_cancel
-from tracemesh.storage.sessions import create_session, delete_session
-from tracemesh.wire.resources import Reconstruction, ReconstructionParameters, SessionCreate
+from tracemesh.storage.models import BATCH, ReconstructionRow
+from tracemesh.storage.reconstructions import Claim, claim_next, request_cancel
+from tracemesh.storage.sessions import delete_session
+from tracemesh.wire.resources import Reconstruction
 
 Start = Callable[..., JobRunner]
 on_sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 """For what does not depend on the kind of database; the rows themselves are tested on both in tests/storage."""
-
-
-@pytest.fixture
-def settings(database_url: str, tmp_path: Path) -> Settings:
-    """Settings for a database of each kind."""
-    return Settings(database_url=database_url, data_dir=tmp_path)
-
-
-@pytest.fixture
-def database(settings: Settings, shared_data: Path) -> Iterator[Database]:
-    """A database with one scanned session, `s`, and an empty one, `empty`."""
-    database = Database(settings.resolved_database_url)
-    database.migrate()
-    sent = recording_from_scan(read_rawnet((shared_data / "lilium.rawnet").read_text()), "r", "s")
-    with database.write() as transaction:
-        create_session(transaction, SessionCreate(id="s"))
-        create_session(transaction, SessionCreate(id="empty"))
-        state, group = open_recording(transaction, sent.hello, sent.hello.model_dump_json().encode()), Group()
-        for message in sent.messages:
-            state.advance(message, 1)
-            group.add(state, message, message.model_dump_json(exclude_none=True).encode())
-        commit(transaction, group)
-    yield database
-    database.close()
-
-
-@pytest.fixture
-def seen() -> list[Reconstruction]:
-    """What the runner told its listener."""
-    return []
-
-
-@pytest.fixture
-def start(settings: Settings, database: Database, seen: list[Reconstruction]) -> Iterator[Start]:
-    """Start runners; all are closed after the test."""
-    runners: list[JobRunner] = []
-
-    def begin(listener: Callable[[Reconstruction], None] = seen.append) -> JobRunner:
-        runners.append(JobRunner(settings, database, listener))
-        return runners[-1]
-
-    yield begin
-    for runner in runners:
-        runner.close()
-
-
-def queue(database: Database, session: str = "s") -> str:
-    with database.write() as transaction:
-        return create_reconstruction(transaction, session, ReconstructionParameters(step="3%")).id
-
-
-def look(database: Database, job: str) -> Reconstruction:
-    with database.read() as transaction:
-        return get_reconstruction(transaction, job)
-
-
-def wait(database: Database, job: str) -> Reconstruction:
-    while (state := look(database, job)).state in ("queued", "running"):
-        time.sleep(0.05)
-    return state
-
-
-def workers() -> list[int]:
-    """Worker processes of this process; multiprocessing's own resource tracker is none."""
-    me, found = str(os.getpid()), []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            parent = (folder / "stat").read_text().rsplit(")", 1)[1].split()[1]
-            command = (folder / "cmdline").read_text()
-        except OSError:
-            continue
-        if parent == me and "spawn_main" in command:
-            found.append(int(folder.name))
-    return found
+embedded = pytest.mark.parametrize("executor", ["embedded"], indirect=True)
+on_dask = pytest.mark.parametrize("executor", ["dask"], indirect=True)
 
 
 def test_a_job_leaves_its_files_and_tells_how_far_it_is(
     start: Start, settings: Settings, database: Database, seen: list[Reconstruction]
 ) -> None:
     job = queue(database)
-    start().submit(job)
+    start()
     done = wait(database, job)
     assert (done.state, done.error, done.fraction) == ("done", None, 1.0)
     store = open_artifacts(settings)
@@ -115,34 +40,39 @@ def test_a_job_leaves_its_files_and_tells_how_far_it_is(
         files = {n: store.path(artifact_row(transaction, job, n).sha256).read_bytes() for n in done.artifacts}
     vertices, faces = read_mesh(files["mesh.glb"], "glb")
     assert len(faces) > len(vertices) > len(read_network(files["network.json"].decode()).points) > 100
-    deadline = time.monotonic() + 10
-    while seen[-1].state != "done" and time.monotonic() < deadline:
-        time.sleep(0.02)
+    until(lambda: seen[-1].state == "done")
     fractions = [s.fraction for s in seen]
     assert fractions == sorted(fractions)
     assert {s.state for s in seen} >= {"running", "done"}
 
 
+def test_two_servers_share_the_jobs(start: Start, database: Database) -> None:
+    """Each job runs once, though two servers that came one after the other look for work."""
+    start(job_slots=2)
+    jobs = [queue(database) for _ in range(4)]
+    start(job_slots=2)
+    assert {wait(database, job).state for job in jobs} == {"done"}
+    assert {row(database, job).attempt for job in jobs} == {1}
+
+
 @on_sqlite
+@embedded
 def test_a_job_runs_in_the_worker_that_was_prepared_for_it(start: Start, database: Database) -> None:
     runner = start()
     assert workers() == []
     runner.prepare()
     prepared = workers()
     assert len(prepared) == 1
-    job = queue(database)
-    runner.submit(job)
-    assert wait(database, job).state == "done"
+    assert wait(database, queue(database)).state == "done"
     assert workers() == prepared
 
 
 @on_sqlite
+@embedded
 def test_an_interrupt_at_the_terminal_leaves_workers_to_the_server(start: Start, database: Database) -> None:
-    runner = start()
+    start()
     for _ in range(2):
-        job = queue(database)
-        runner.submit(job)
-        assert wait(database, job).state == "done"
+        assert wait(database, queue(database)).state == "done"
         before = workers()
         os.kill(before[0], signal.SIGINT)
         time.sleep(0.2)
@@ -150,6 +80,7 @@ def test_an_interrupt_at_the_terminal_leaves_workers_to_the_server(start: Start,
 
 
 @on_sqlite
+@embedded
 def test_a_closed_runner_starts_no_worker(start: Start) -> None:
     runner = start()
     runner.close()
@@ -160,42 +91,39 @@ def test_a_closed_runner_starts_no_worker(start: Start) -> None:
 @on_sqlite
 def test_what_cannot_be_reconstructed_says_why(start: Start, database: Database) -> None:
     job = queue(database, "empty")
-    start().submit(job)
+    start()
     failed = wait(database, job)
     assert (failed.state, failed.error) == ("failed", "session empty has no curve with samples")
 
 
 @on_sqlite
+@embedded
 def test_a_killed_worker_costs_an_attempt_not_the_job(start: Start, database: Database) -> None:
-    first = queue(database)
-    runner = start()
-    runner.submit(first)
-    wait(database, first)
-    killed = threading.Thread(target=_kill_next, args=(database, second := queue(database), 1))
-    killed.start()
-    runner.submit(second)
-    killed.join()
-    done = wait(database, second)
-    assert done.state == "done"
-    assert _attempt(database, second) == 2
+    start()
+    wait(database, queue(database))
+    job = queue(database, step=LONG)
+    wait_until_it_works(database, job)
+    kill(workers())
+    assert wait(database, job).state == "done"
+    assert (row(database, job).attempt, row(database, job).losses) == (2, 1)
 
 
 @on_sqlite
+@embedded
 def test_a_job_that_kills_every_worker_fails_in_words(start: Start, database: Database) -> None:
-    job, runner = queue(database), start()
-    killed = threading.Thread(target=_kill_next, args=(database, job, 3))
-    killed.start()
-    runner.submit(job)
-    killed.join()
-    assert wait(database, job).error == "its process was lost 3 times"
+    job = queue(database, step=LONG)
+    start()
+    for attempt in (1, 2):
+        until(lambda attempt=attempt: row(database, job).attempt == attempt and look(database, job).fraction > 0)
+        kill(workers())
+    assert wait(database, job).error == "its process was lost 2 times"
 
 
 @on_sqlite
 def test_a_running_job_is_cancelled_between_stages(start: Start, database: Database) -> None:
-    job = queue(database)
-    start().submit(job)
-    while look(database, job).state == "queued":
-        time.sleep(0.01)
+    job = queue(database, step=LONG)
+    start()
+    wait_until_it_works(database, job)
     with database.write() as transaction:
         request_cancel(transaction, job)
     cancelled = wait(database, job)
@@ -203,56 +131,100 @@ def test_a_running_job_is_cancelled_between_stages(start: Start, database: Datab
 
 
 @on_sqlite
-def test_what_a_lost_server_left_is_taken_up(start: Start, database: Database) -> None:
-    """One row says running, though nobody runs it; one waits."""
-    lost, waiting = queue(database), queue(database)
-    with database.write() as transaction:
-        transaction.execute(
-            update(ReconstructionRow).where(ReconstructionRow.id == lost).values(state="running", attempt=1)
-        )
+def test_a_job_that_takes_too_long_fails_in_words_and_frees_its_worker(start: Start, database: Database) -> None:
+    job, after = queue(database, step=LONG), queue(database)
+    runner = start(job_timeout=1)
+    failed = wait(database, job)
+    assert (failed.state, failed.error) == ("failed", "it took longer than 1 s")
+    runner.close()
     start()
-    assert wait(database, lost).state == "done"
-    assert wait(database, waiting).state == "done"
-    assert (_attempt(database, lost), _attempt(database, waiting)) == (2, 1)
+    assert wait(database, after).state in ("done", "failed")
+
+
+def test_a_process_has_no_more_memory_than_it_may_take() -> None:
+    slot = Slot(memory=2**29)
+    try:
+        with pytest.raises(MemoryError):
+            slot.submit(bytearray, 2**29).result()
+        assert slot.submit(len, b"goes on").result() == 7
+    finally:
+        slot.close()
 
 
 @on_sqlite
-def test_closing_ends_the_worker_and_the_next_start_goes_on(start: Start, database: Database) -> None:
-    job, runner = queue(database), start()
-    runner.submit(job)
-    while look(database, job).state == "queued":
-        time.sleep(0.01)
+@embedded
+def test_a_job_that_needs_too_much_memory_fails_in_words(start: Start, database: Database) -> None:
+    job = queue(database, step="0.002%")
+    start(job_memory=2**29)
+    assert wait(database, job).error == "it needs more memory than there is"
+
+
+@on_sqlite
+@embedded
+def test_who_waits_for_a_job_does_not_wait_for_batches(start: Start, database: Database) -> None:
+    batch = [queue(database) for _ in range(3)]
+    with database.write() as transaction:
+        transaction.execute(update(ReconstructionRow).values(priority=BATCH))
+    interactive = queue(database)
+    start()
+    wait(database, interactive)
+    assert [look(database, job).state for job in batch[1:]] == ["queued", "queued"]
+    assert {wait(database, job).state for job in batch} == {"done"}
+
+
+@pytest.mark.usefixtures("quick_lease")
+def test_what_a_lost_server_left_is_taken_up(start: Start, database: Database) -> None:
+    """One row says running, though nobody watches over it; one waits."""
+    lost, waiting = queue(database), queue(database)
+    with database.write() as transaction:
+        assert claim_next(transaction) == Claim(lost, 1)
+    start()
+    assert wait(database, lost).state == "done"
+    assert wait(database, waiting).state == "done"
+    assert (row(database, lost).attempt, row(database, waiting).attempt) == (2, 1)
+
+
+@on_sqlite
+@embedded
+@pytest.mark.usefixtures("quick_lease")
+def test_a_server_that_comes_later_leaves_what_another_one_runs(start: Start, database: Database) -> None:
+    job = queue(database, step=LONG)
+    start()
+    wait_until_it_works(database, job)
+    start()
+    assert wait(database, job).state == "done"
+    assert row(database, job).attempt == 1
+
+
+@on_sqlite
+def test_closing_gives_jobs_up_and_the_next_start_goes_on(start: Start, database: Database) -> None:
+    job, runner = queue(database, step=LONG), start()
+    wait_until_it_works(database, job)
     runner.close()
     assert workers() == []
-    assert look(database, job).state == "running"
+    assert (look(database, job).state, row(database, job).losses) == ("queued", 0)
     start()
     assert wait(database, job).state == "done"
 
 
 @on_sqlite
 def test_a_session_deleted_under_its_job_harms_nobody(start: Start, database: Database) -> None:
-    job, runner = queue(database), start()
-    runner.submit(job)
-    while look(database, job).state == "queued":
-        time.sleep(0.01)
+    job = queue(database, step=LONG)
+    start()
+    wait_until_it_works(database, job)
     with database.write() as transaction:
         delete_session(transaction, "s")
-    after = queue(database, "empty")
-    runner.submit(after)
-    assert wait(database, after).state == "failed"
+    assert wait(database, queue(database, "empty")).state == "failed"
 
 
-def _attempt(database: Database, job: str) -> int:
-    with database.read() as transaction:
-        return transaction.get_one(ReconstructionRow, job).attempt
-
-
-def _kill_next(database: Database, job: str, times: int) -> None:
-    """kill -9 the worker of each of the next attempts as soon as it runs."""
-    for attempt in range(1, times + 1):
-        while _attempt(database, job) < attempt or not (alive := workers()):
-            time.sleep(0.01)
-        for pid in alive:
-            os.kill(pid, signal.SIGKILL)
-        while set(workers()) & set(alive):
-            time.sleep(0.01)
+@on_sqlite
+def test_an_artifact_store_that_is_away_is_told(start: Start, settings: Settings, database: Database) -> None:
+    """Where its folder should be is a file; once that is gone, the same wish is granted."""
+    start()
+    settings.artifact_dir.rmdir()
+    settings.artifact_dir.write_text("in the way")
+    failed = wait(database, queue(database))
+    assert failed.state == "failed"
+    assert failed.error == "its files could not be stored: Not a directory; try again"
+    settings.artifact_dir.unlink()
+    assert wait(database, queue(database)).state == "done"

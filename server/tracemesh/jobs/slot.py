@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -16,11 +17,20 @@ T = TypeVar("T")
 class Slot:
     """Runs one function after another in a process of its own, started when it is first needed; from any thread."""
 
-    def __init__(self) -> None:
-        """No process yet."""
+    def __init__(self, niceness: int = 0, memory: int | None = None) -> None:
+        """No process yet. niceness: how far it stands back behind others; memory: most bytes that it may take."""
+        self._niceness = niceness
+        self._memory = memory
         self._pool: ProcessPoolExecutor | None = None
         self._closed = False
         self._lock = threading.Lock()
+
+    def connect(self) -> None:
+        """Nothing: the process starts when it is needed."""
+
+    def prepare(self, function: Callable[..., object]) -> None:
+        """Run something beforehand, so that the next function finds a process that is ready."""
+        self.submit(function)
 
     def submit(self, function: Callable[..., T], *arguments: object) -> Future[T]:
         """Run in the process; the future raises BrokenProcessPool when the process is lost.
@@ -32,28 +42,39 @@ class Slot:
                 raise BrokenProcessPool("the slot is closed")
             if self._pool is None:
                 spawn = multiprocessing.get_context("spawn")
-                self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_end_with_parent)
+                self._pool = ProcessPoolExecutor(
+                    1, mp_context=spawn, initializer=_begin, initargs=(self._niceness, self._memory)
+                )
             return self._pool.submit(function, *arguments)
 
     def renew(self) -> None:
-        """The process was lost; the next submission starts another one."""
+        """End the process, if it was not lost; the next submission starts another one."""
         pool = self._taken()
         if pool is not None:
-            pool.shutdown(wait=False)
+            for process in list((pool._processes or {}).values()):
+                process.kill()
+            pool.shutdown(wait=True, cancel_futures=True)
 
     def close(self) -> None:
         """End the process at once, for good; what it was doing is left undone."""
         self._closed = True
-        pool = self._taken()
-        if pool is not None:
-            for process in list((pool._processes or {}).values()):
-                process.terminate()
-            pool.shutdown(wait=True, cancel_futures=True)
+        self.renew()
 
     def _taken(self) -> ProcessPoolExecutor | None:
         with self._lock:
             pool, self._pool = self._pool, None
             return pool
+
+
+def _begin(niceness: int, memory: int | None) -> None:
+    """What a worker process does first."""
+    if sys.platform != "win32":  # which has neither
+        import resource
+
+        os.nice(niceness)
+        if memory is not None:
+            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    _end_with_parent()
 
 
 def _end_with_parent() -> None:

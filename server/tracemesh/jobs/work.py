@@ -3,13 +3,14 @@
 The kernel is imported where it runs: the server itself stays small and starts at once.
 """
 
+from concurrent.futures import BrokenExecutor
 from typing import TYPE_CHECKING
 
-from tracemesh.errors import Cancelled, TracemeshError
+from tracemesh.errors import Cancelled, TracemeshError, Unavailable
 from tracemesh.formats.networks import read_network
 from tracemesh.storage.artifacts import ArtifactStore, artifact_row
 from tracemesh.storage.database import Database
-from tracemesh.storage.reconstructions import finish, get_reconstruction, report_progress
+from tracemesh.storage.reconstructions import Claim, begin, finish, get_reconstruction, report_progress
 from tracemesh.storage.scans import load_scan
 from tracemesh.wire.resources import JobState, Reconstruction
 
@@ -25,21 +26,24 @@ def load_kernel() -> None:
     import tracemesh.pipeline  # noqa: F401 - work finds it loaded
 
 
-def work(database_url: str, store: ArtifactStore, identifier: str, attempt: int) -> None:
-    """Run an attempt to its end, whatever that is; the row tells."""
+def work(database_url: str, store: ArtifactStore, claim: Claim) -> None:
+    """Run an attempt to its end, whatever that is; the row tells.
+
+    Raises BrokenExecutor when another process began with the same attempt: a cluster tries again by itself, without
+    counting.
+    """
     database = Database(database_url)
     try:
-        _Attempt(database, store, identifier, attempt).run()
+        _Attempt(database, store, claim).run()
     finally:
         database.close()
 
 
 class _Attempt:
-    def __init__(self, database: Database, store: ArtifactStore, identifier: str, attempt: int) -> None:
+    def __init__(self, database: Database, store: ArtifactStore, claim: Claim) -> None:
         self._database = database
         self._store = store
-        self._identifier = identifier
-        self._attempt = attempt
+        self._claim = claim
 
     def run(self) -> None:
         try:
@@ -52,13 +56,22 @@ class _Attempt:
             self._end("failed", "it needs more memory than there is")
 
     def _reconstruct(self) -> None:
+        with self._database.write() as transaction:
+            if not begin(transaction, self._claim):
+                raise BrokenExecutor(f"attempt {self._claim.attempt} at {self._claim.id} began before, or ended")
         with self._database.read() as transaction:
-            wanted = get_reconstruction(transaction, self._identifier)
+            wanted = get_reconstruction(transaction, self._claim.id)
         result = self._span(wanted) if NETWORK in wanted.artifacts else self._from_scan(wanted)
         files = {name: content for name, content in _files(result).items() if name not in wanted.artifacts}
-        artifacts = {name: (self._store.put(content), len(content)) for name, content in files.items()}
+        artifacts = self._stored(files)
         with self._database.write() as transaction:
-            finish(transaction, self._identifier, self._attempt, "done", artifacts=artifacts)
+            finish(transaction, self._claim, "done", artifacts=artifacts)
+
+    def _stored(self, files: dict[str, bytes]) -> dict[str, tuple[str, int]]:
+        try:
+            return {name: (self._store.put(content), len(content)) for name, content in files.items()}
+        except OSError as error:
+            raise Unavailable(f"its files could not be stored: {error.strerror}; try again") from None
 
     def _from_scan(self, wanted: Reconstruction) -> "Result":
         from tracemesh.pipeline import reconstruct
@@ -77,12 +90,12 @@ class _Attempt:
 
     def _progress(self, stage: str, fraction: float) -> None:
         with self._database.write() as transaction:
-            if not report_progress(transaction, self._identifier, self._attempt, stage, fraction):
-                raise Cancelled(f"reconstruction {self._identifier} was asked to stop")
+            if not report_progress(transaction, self._claim, stage, fraction):
+                raise Cancelled(f"reconstruction {self._claim.id} was asked to stop")
 
     def _end(self, state: JobState, error: str | None = None) -> None:
         with self._database.write() as transaction:
-            finish(transaction, self._identifier, self._attempt, state, error)
+            finish(transaction, self._claim, state, error)
 
 
 def _files(result: "Result") -> dict[str, bytes]:

@@ -28,10 +28,9 @@ class ArtifactStore:
     """
 
     def __init__(self, folder: Path, bucket: str = "") -> None:
-        """Keep contents in `folder`, which is made when it is missing, and in the bucket with this URL, if any."""
+        """Keep contents in `folder`, which is made when it is needed, and in the bucket with this URL, if any."""
         self._folder = folder
         self._bucket = Bucket(bucket) if bucket else None
-        folder.mkdir(parents=True, exist_ok=True)
 
     def __reduce__(self) -> tuple[type["ArtifactStore"], tuple[Path, str]]:
         """How it is sent to another process: without connections."""
@@ -92,8 +91,8 @@ class ArtifactStore:
         target = self._target(digest)
         try:
             os.utime(target)  # as young as the job that stores it
-        except FileNotFoundError:
-            target.parent.mkdir(exist_ok=True)
+        except (FileNotFoundError, NotADirectoryError):
+            target.parent.mkdir(parents=True, exist_ok=True)
             self._write(target, content)
             if self._bucket is not None:
                 self._shrink()
@@ -127,7 +126,8 @@ def _unlink_if_older(file: Path, latest: float) -> bool:
 
 
 def open_artifacts(settings: Settings) -> ArtifactStore:
-    """The store that the settings name."""
+    """The store that the settings name. Raises OSError when its folder cannot be made."""
+    settings.artifact_dir.mkdir(parents=True, exist_ok=True)
     return ArtifactStore(settings.artifact_dir, settings.artifact_bucket)
 
 

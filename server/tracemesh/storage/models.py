@@ -5,12 +5,25 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from typing import Any
 
-from sqlalchemy import JSON, BigInteger, DateTime, Dialect, ForeignKey, Integer, LargeBinary, String, UniqueConstraint
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    String,
+    UniqueConstraint,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
 Long = BigInteger().with_variant(Integer(), "sqlite")
 """64 bits on every database; only INTEGER counts by itself on SQLite, and holds 64 bits there."""
+INTERACTIVE, BATCH = 0, 1
+"""Priorities of jobs: somebody waits for the first kind."""
 
 
 class UtcTime(TypeDecorator[datetime]):
@@ -140,18 +153,26 @@ class MarkRow(Base):
 
 
 class ReconstructionRow(Base):
-    """A reconstruction of a session: this row is the job. `attempt` guards against results of a lost attempt."""
+    """A reconstruction of a session: this row is the job.
+
+    `attempt` guards against results of a lost attempt, `losses` counts those; `beat` goes up as long as somebody
+    watches over the attempt. The least `priority` is first.
+    """
 
     __tablename__ = "reconstructions"
+    __table_args__ = (Index("ix_reconstructions_queue", "state", "priority", "created"),)
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     session_id: Mapped[str] = mapped_column(ForeignKey("sessions.id", ondelete="CASCADE"), index=True)
-    state: Mapped[str] = mapped_column(String(16), index=True, default="queued")
+    state: Mapped[str] = mapped_column(String(16), default="queued")
     stage: Mapped[str] = mapped_column(String(200), default="")
     fraction: Mapped[float] = mapped_column(default=0.0)
     error: Mapped[str | None]
     parameters: Mapped[dict[str, Any]] = mapped_column(JSON)
+    priority: Mapped[int] = mapped_column(default=INTERACTIVE)
     attempt: Mapped[int] = mapped_column(default=0)
+    losses: Mapped[int] = mapped_column(default=0)
+    beat: Mapped[int] = mapped_column(Long, default=0)
     cancel_requested: Mapped[bool] = mapped_column(default=False)
     created: Mapped[datetime] = mapped_column(UtcTime, default=now)
     finished: Mapped[datetime | None] = mapped_column(UtcTime)

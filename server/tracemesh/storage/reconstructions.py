@@ -1,8 +1,13 @@
-"""The job table. A row is the job; whatever runs it writes only while it holds the row's present attempt."""
+"""The job table. A row is the job; whatever runs it writes only while it holds the row's present attempt.
 
-from collections.abc import Mapping
+Several servers may share it. Each raises the beat of what it runs; whose beat stands still, as another server's own
+clock measures it, is lost: no two clocks are compared.
+"""
 
-from sqlalchemy import ColumnElement, select, update
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import Conflict, NotFound
@@ -10,9 +15,17 @@ from tracemesh.storage.models import ArtifactRow, ReconstructionRow, new_id, now
 from tracemesh.storage.sessions import session_row
 from tracemesh.wire.resources import JobState, Reconstruction, ReconstructionParameters
 
-MAX_ATTEMPTS = 3
-"""A job whose process or server was lost is run again, but not for ever."""
+MAX_LOSSES = 2
+"""A job whose process or server was lost is run again, once."""
+FIRST_STAGE = "reading"
 UNFINISHED: tuple[JobState, ...] = ("queued", "running")
+
+
+class Claim(NamedTuple):
+    """An attempt at a reconstruction; whoever has it may write into the row as long as the row is at this attempt."""
+
+    id: str
+    attempt: int
 
 
 def create_reconstruction(
@@ -60,7 +73,9 @@ def request_cancel(transaction: Transaction, identifier: str) -> Reconstruction:
 
     Raises NotFound, and Conflict when it has ended.
     """
-    row = _row(transaction, identifier)
+    row = transaction.get(ReconstructionRow, identifier, with_for_update=True, populate_existing=True)
+    if row is None:
+        raise _unknown(identifier)
     if row.state not in UNFINISHED:
         raise Conflict(f"reconstruction {identifier} is {row.state} already")
     row.cancel_requested = True
@@ -70,60 +85,84 @@ def request_cancel(transaction: Transaction, identifier: str) -> Reconstruction:
     return describe(transaction, row)
 
 
-def requeue_unfinished(transaction: Transaction) -> list[str]:
-    """At start nothing runs yet: rows that say so were lost with the server. All that wait, oldest first."""
-    running = transaction.scalars(select(ReconstructionRow).where(ReconstructionRow.state == "running"))
-    for row in running:
-        requeue(transaction, row.id, row.attempt)
-    transaction.flush()
-    waiting = select(ReconstructionRow.id).where(ReconstructionRow.state == "queued")
-    return list(transaction.scalars(waiting.order_by(ReconstructionRow.created)))
-
-
-def claim(transaction: Transaction, identifier: str) -> int | None:
-    """Begin the next attempt; its number, or None when the row does not wait any more."""
-    row = transaction.get(ReconstructionRow, identifier)
-    if row is None or row.state != "queued":
+def claim_next(transaction: Transaction) -> Claim | None:
+    """Begin the next attempt at the job that is first in line; no other server gets the same one."""
+    waiting = select(ReconstructionRow).where(ReconstructionRow.state == "queued")
+    in_line = waiting.order_by(ReconstructionRow.priority, ReconstructionRow.created, ReconstructionRow.id).limit(1)
+    row = transaction.scalar(in_line.with_for_update(skip_locked=True))
+    if row is None:
         return None
     row.state, row.stage, row.fraction, row.attempt = "running", "", 0.0, row.attempt + 1
-    return row.attempt
+    return Claim(row.id, row.attempt)
 
 
-def requeue(transaction: Transaction, identifier: str, attempt: int) -> bool:
-    """The attempt's worker was lost: try again, or give up after too many; whether it waits again."""
-    row = transaction.get(ReconstructionRow, identifier)
-    if row is None or (row.state, row.attempt) != ("running", attempt):
+def begin(transaction: Transaction, claim: Claim) -> bool:
+    """Whether this is the first and only process that works on the attempt: a cluster may start one twice."""
+    first = update(ReconstructionRow).where(_held(claim), ReconstructionRow.stage == "").values(stage=FIRST_STAGE)
+    return transaction.scalar(first.returning(ReconstructionRow.cancel_requested)) is False
+
+
+def beat(transaction: Transaction, claims: Collection[Claim]) -> None:
+    """Say that somebody still watches over these attempts."""
+    for claim in claims:
+        transaction.execute(update(ReconstructionRow).where(_held(claim)).values(beat=ReconstructionRow.beat + 1))
+
+
+def running(transaction: Transaction) -> dict[Claim, int]:
+    """Attempts under way on any server, each with its beat."""
+    columns = ReconstructionRow.id, ReconstructionRow.attempt, ReconstructionRow.beat
+    rows = transaction.execute(select(*columns).where(ReconstructionRow.state == "running"))
+    return {Claim(identifier, attempt): beat for identifier, attempt, beat in rows}
+
+
+def count_waiting(transaction: Transaction) -> int:
+    """Jobs that nobody has begun yet."""
+    waiting = select(func.count()).select_from(ReconstructionRow).where(ReconstructionRow.state == "queued")
+    return transaction.scalar(waiting) or 0
+
+
+def release(transaction: Transaction, claim: Claim) -> bool:
+    """Give up an attempt for no fault of the job, which waits again; False when it does not hold the row any more."""
+    row = _locked(transaction, claim)
+    if row is None:
         return False
     if row.cancel_requested:
-        finish(transaction, identifier, attempt, "cancelled")
-    elif attempt >= MAX_ATTEMPTS:
-        finish(transaction, identifier, attempt, "failed", f"its process was lost {attempt} times")
-    else:
-        row.state, row.stage, row.fraction = "queued", "", 0.0
-        return True
-    return False
+        return finish(transaction, claim, "cancelled")
+    row.state, row.stage, row.fraction = "queued", "", 0.0
+    return True
 
 
-def report_progress(transaction: Transaction, identifier: str, attempt: int, stage: str, fraction: float) -> bool:
+def lose(transaction: Transaction, claim: Claim) -> bool:
+    """The attempt's process or server was lost: try again, or give up after too many; whether it waits again."""
+    row = _locked(transaction, claim)
+    if row is None:
+        return False
+    row.losses += 1
+    if row.losses >= MAX_LOSSES and not row.cancel_requested:
+        finish(transaction, claim, "failed", f"its process was lost {row.losses} times")
+        return False
+    return release(transaction, claim) and row.state == "queued"
+
+
+def report_progress(transaction: Transaction, claim: Claim, stage: str, fraction: float) -> bool:
     """Write progress; whether the attempt should go on."""
-    progress = update(ReconstructionRow).where(_held(identifier, attempt)).values(stage=stage, fraction=fraction)
+    progress = update(ReconstructionRow).where(_held(claim)).values(stage=stage, fraction=fraction)
     return transaction.scalar(progress.returning(ReconstructionRow.cancel_requested)) is False
 
 
 def finish(
     transaction: Transaction,
-    identifier: str,
-    attempt: int,
+    claim: Claim,
     state: JobState,
     error: str | None = None,
     artifacts: Mapping[str, tuple[str, int]] | None = None,
 ) -> bool:
     """End an attempt with its artifacts (name -> digest, size); False when it does not hold the row any more."""
-    end = update(ReconstructionRow).where(_held(identifier, attempt)).values(state=state, error=error, finished=now())
+    end = update(ReconstructionRow).where(_held(claim)).values(state=state, error=error, finished=now())
     if transaction.scalar(end.returning(ReconstructionRow.id)) is None:
         return False
     for name, (digest, size) in (artifacts or {}).items():
-        transaction.add(ArtifactRow(reconstruction_id=identifier, name=name, sha256=digest, size=size))
+        transaction.add(ArtifactRow(reconstruction_id=claim.id, name=name, sha256=digest, size=size))
     return True
 
 
@@ -144,13 +183,22 @@ def describe(transaction: Transaction, row: ReconstructionRow) -> Reconstruction
     )
 
 
-def _held(identifier: str, attempt: int) -> ColumnElement[bool]:
-    mine = (ReconstructionRow.id == identifier) & (ReconstructionRow.attempt == attempt)
+def _held(claim: Claim) -> ColumnElement[bool]:
+    mine = (ReconstructionRow.id == claim.id) & (ReconstructionRow.attempt == claim.attempt)
     return mine & (ReconstructionRow.state == "running")
+
+
+def _locked(transaction: Transaction, claim: Claim) -> ReconstructionRow | None:
+    """The row of an attempt that still holds it; nobody else changes it meanwhile."""
+    return transaction.scalar(select(ReconstructionRow).where(_held(claim)).with_for_update())
 
 
 def _row(transaction: Transaction, identifier: str) -> ReconstructionRow:
     row = transaction.get(ReconstructionRow, identifier)
     if row is None:
-        raise NotFound(f"there is no reconstruction {identifier}")
+        raise _unknown(identifier)
     return row
+
+
+def _unknown(identifier: str) -> NotFound:
+    return NotFound(f"there is no reconstruction {identifier}")

@@ -54,7 +54,7 @@ def _store_network(services: Services, session: str, content: bytes) -> Reconstr
 
 
 def _queued(services: Services, response: Response, made: Reconstruction) -> Reconstruction:
-    services.runner.submit(made.id)
+    services.runner.wake()
     services.loop.call_soon_threadsafe(services.hub.progressed, made)
     response.headers["Location"] = f"/api/v1/reconstructions/{made.id}"
     return made
