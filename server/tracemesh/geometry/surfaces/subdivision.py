@@ -1,4 +1,4 @@
-"""A curve network with more points on its segments, for meshes finer than the network itself or finer in places."""
+"""A curve network with more points on its segments, for meshes finer than itself or finer in places, or with fewer."""
 
 from dataclasses import replace
 
@@ -40,6 +40,23 @@ def graded(network: CurveNetwork) -> CurveNetwork:
         share = np.sqrt(beside.min(1)[long] / lengths[long])
         network = _inserted(network, long, np.where(beside.argmin(1)[long] == 0, share, 1 - share))
     return network
+
+
+def thinned(network: CurveNetwork, every: int) -> CurveNetwork:
+    """The network with about every k-th point of its segments, their ends among them; a segment keeps three edges or
+    more, a closed one six, if it has them.
+    """
+    chosen = []
+    for segment in network.segments:
+        parts = len(segment.points) - 1
+        least = 6 if segment.points[0] == segment.points[-1] else 3
+        edges = max(round(parts / every), min(parts, least))
+        chosen.append(segment.points[np.round(np.linspace(0, parts, edges + 1)).astype(np.int64)])
+    kept = np.unique(np.concatenate(chosen))
+    number = np.full(len(network.points), -1)
+    number[kept] = np.arange(len(kept))
+    segments = tuple(replace(s, points=number[c]) for s, c in zip(network.segments, chosen, strict=True))
+    return CurveNetwork(network.points[kept], network.normals[kept], number[network.nodes], segments)
 
 
 def _edges(network: CurveNetwork) -> tuple[Ints, Floats]:

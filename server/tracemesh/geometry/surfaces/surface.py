@@ -9,8 +9,8 @@ from tracemesh.geometry.surfaces.surface_stages import (
     finished,
     linear_patches,
     prepared,
-    refined_surface,
 )
+from tracemesh.geometry.surfaces.two_scales import refined_surface
 
 __all__ = ["Progress", "SurfaceParameters", "SurfaceResult", "span_surface"]
 
@@ -26,5 +26,5 @@ def span_surface(
     parameters, stages = parameters or SurfaceParameters(), Stages(progress)
     complex_ = prepared(network, parameters, stages)
     patches, vertices, normals = linear_patches(complex_, parameters, stages)
-    vertices, normals, refinement = refined_surface(patches, vertices, normals, parameters.refinement, stages)
+    vertices, normals, refinement = refined_surface(complex_, patches, vertices, normals, parameters, stages)
     return finished(complex_, patches, vertices, normals, refinement, stages)

@@ -26,8 +26,8 @@ from tracemesh.geometry.surfaces.surface_stages import (
     finished,
     linear_patches,
     prepared,
-    refined_surface,
 )
+from tracemesh.geometry.surfaces.two_scales import LARGEST_REFINED, refined_surface
 
 Mask = NDArray[np.bool_]
 
@@ -49,10 +49,14 @@ class SurfaceSolver:
     """Spans surfaces over one network after another and reuses the patches they have in common."""
 
     def __init__(self, parameters: SurfaceParameters | None = None) -> None:
-        """parameters: as for `span_surface`; with soft constraints every point moves and nothing is reused."""
+        """parameters: as for `span_surface`.
+
+        With soft constraints every point moves, and a mesh too large to be refined itself follows a coarse one as a
+        whole: then nothing is reused.
+        """
         self._parameters = parameters or SurfaceParameters()
         self._known: dict[bytes, _Solved] = {}
-        self._refined = False
+        self._refined = self._whole = False
 
     def span(self, network: CurveNetwork, progress: Progress | None = None) -> SurfaceResult:
         """The surface over a network; errors as for `span_surface`. `resolved_patches` in the report counts
@@ -63,12 +67,13 @@ class SurfaceSolver:
         outlines = outlines_of(complex_)
         keys = [_key(outline) for outline in outlines]
         changed = np.array([key not in self._known for key in keys])
-        if changed.all() or complex_.partners or self._parameters.soft is not None:
+        if changed.all() or self._whole or complex_.partners or self._parameters.soft is not None:
             changed[:] = True
-            patches, vertices, normals = linear_patches(complex_, self._parameters, stages)
-            mode = self._parameters.refinement
-            vertices, normals, refinement = refined_surface(patches, vertices, normals, mode, stages)
+            linear = linear_patches(complex_, self._parameters, stages)
+            patches = linear[0]
+            vertices, normals, refinement = refined_surface(complex_, *linear, self._parameters, stages)
             self._refined = bool(refinement["used"])
+            self._whole = self._refined and patches.count > LARGEST_REFINED
         else:
             refinement = {"mode": self._parameters.refinement, "used": self._refined}
             patches, vertices, normals = self._assembled(complex_, outlines, keys, changed, stages)

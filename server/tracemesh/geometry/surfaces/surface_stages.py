@@ -17,14 +17,12 @@ from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_l
 from tracemesh.geometry.surfaces.linear_surface import linear_surface, rebuilt_surface, settled_surface
 from tracemesh.geometry.surfaces.patches import PatchMesh, triangulate_patches, unrolled_well
 from tracemesh.geometry.surfaces.quality import inverted_faces, mesh_quality
-from tracemesh.geometry.surfaces.refinement import refine
 from tracemesh.geometry.surfaces.soft_constraints import softened_points
 from tracemesh.geometry.surfaces.subdivision import graded, subdivided
 
 Progress = Callable[[str, float], None]
 COARSE = 3.0  # edges inside the patches of the first solve, which only serves to unroll them, over those of the mesh
 LARGEST_UNROLLS = 4
-LARGEST_AUTOMATIC = 20_000  # vertices; the factorisation of the refinement grows faster than the mesh
 FARTHEST = 2.0  # distance of a vertex from the middle of the network, over its diagonal
 
 
@@ -105,23 +103,6 @@ def finished(
     curvature = extended_to_boundary(mean_curvature(vertices, faces, normals), faces, boundary)
     mesh = Mesh(vertices, faces, normals, curvature, gaussian_curvature(vertices, faces, normals), patches.patch)
     return SurfaceResult(mesh, _report(mesh, complex_, stages) | {"refinement": refinement})
-
-
-def refined_surface(
-    patches: PatchMesh, vertices: Floats, normals: Floats, mode: str, stages: Stages
-) -> tuple[Floats, Floats, dict[str, object]]:
-    """Vertices and normals, refined if that is wanted and convincing, and what the report says about it."""
-    report: dict[str, object] = {"mode": mode, "used": False}
-    if mode == "auto" and patches.count > LARGEST_AUTOMATIC:
-        return vertices, normals, report | {"skipped": f"more than {LARGEST_AUTOMATIC} vertices"}
-    if mode == "off" or patches.count == patches.fixed:
-        return vertices, normals, report
-    stages.begin("refinement", 0.5)
-    refined = refine(vertices, normals, patches.faces, patches.patch, patches.fixed)
-    report["evidence"] = refined.evidence
-    if mode == "auto" and not refined.convincing:
-        return vertices, normals, report
-    return refined.vertices, refined.normals, report | {"used": True}
 
 
 def linear_patches(
