@@ -90,9 +90,11 @@ class Bridge:
                 self._console.say(self._recorder.end(closed=False))
         if self._uplink.acknowledged < self._spool.next_seq:
             self._console.say("sending the rest; Ctrl-C leaves it in the spool for the next start")
-        sent = asyncio.ensure_future(self._uplink.finished())
+        sent = asyncio.ensure_future(self._uplink.finished_or_refused())
         interrupted = asyncio.ensure_future(self._interrupted.wait())
         await asyncio.wait((sent, interrupted), return_when=asyncio.FIRST_COMPLETED)
+        if sent.done():
+            self._failure = sent.exception()
         for task in (sent, interrupted):
             task.cancel()
 

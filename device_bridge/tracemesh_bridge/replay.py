@@ -63,7 +63,10 @@ class _Lines:
 
 
 def replay(file: RecordedFile, server: str) -> str:
-    """Send a recording; the session that it is in then. Goes on until the server has all of it."""
+    """Send a recording; the session that it is in then.
+
+    Goes on until the server has all of it; raises Refused when the server does not want it.
+    """
     return asyncio.run(_replay(file, server))
 
 
@@ -77,7 +80,7 @@ async def _replay(file: RecordedFile, server: str) -> str:
 
     tasks = [asyncio.ensure_future(uplink.run()), asyncio.ensure_future(release())]
     try:
-        await uplink.finished()
+        await uplink.finished_or_refused()
     finally:
         for task in tasks:
             task.cancel()

@@ -28,8 +28,8 @@ STALE_AFTER = 5.0
 PING_INTERVAL, PING_TIMEOUT = 5.0, 10.0
 """s between two questions whether the other side is there, and for which an answer is waited for."""
 FIRST_DELAY, LONGEST_DELAY = 0.25, 15.0
-_FINAL = ("version", "malformed", "forbidden")
-"""Errors that the same recording will meet again: tried again only after the longest delay."""
+_FINAL = ("version", "malformed", "forbidden", "unknown")
+"""Errors that the same recording will meet again: tried again only after the longest delay, or not at all."""
 
 
 class Lines(Protocol):
@@ -85,6 +85,8 @@ class Uplink:
         self.acknowledged = log.first_seq
         """Number of messages that the server has."""
         self.session = ""
+        self.refusal: Refused | None = None
+        """Why the server does not want this recording, while it does not."""
 
     def wake(self) -> None:
         """There is something new to send."""
@@ -96,10 +98,12 @@ class Uplink:
         while True:
             before = self.acknowledged
             try:
-                await self._connection()
+                await self._admitted()
             except Refused as error:
                 delay = LONGEST_DELAY
                 self._link.down(str(error))
+                self.refusal = error
+                self._progress.set()
             except (OSError, TimeoutError, WebSocketException, BridgeError) as error:
                 self._link.down(failure(error))
             if self.acknowledged > before:
@@ -112,6 +116,22 @@ class Uplink:
         while self.acknowledged < self._log.next_seq:
             self._progress.clear()
             await self._progress.wait()
+
+    async def finished_or_refused(self) -> None:
+        """The same, for whoever does not wait for a server to change its mind. Raises Refused."""
+        while self.refusal is None and self.acknowledged < self._log.next_seq:
+            self._progress.clear()
+            await self._progress.wait()
+        if self.refusal is not None:
+            raise self.refusal
+
+    async def _admitted(self) -> None:
+        try:
+            await self._connection()
+        except InvalidStatus as error:
+            if error.response.status_code in (401, 403):
+                raise Refused("the server wants a token, or another one: set TRACEMESH_TOKEN") from error
+            raise
 
     async def _connection(self) -> None:
         self._link.to(LinkState.OPENING, self._url)
@@ -141,6 +161,7 @@ class Uplink:
             )
         self.session = welcome.session
         self._resume(welcome.next_seq)
+        self.refusal = None
 
     def _resume(self, next_seq: int) -> None:
         if next_seq < self._log.first_seq:
@@ -240,8 +261,6 @@ def _raise(error: ErrorMessage) -> NoReturn:
 def failure(error: BaseException) -> str:
     """Why a connection failed, for people."""
     match error:
-        case InvalidStatus() if error.response.status_code in (401, 403):
-            return "the server wants a token, or another one: set TRACEMESH_TOKEN"
         case InvalidStatus():
             return f"the server answered HTTP {error.response.status_code}"
         case ConnectionClosed():

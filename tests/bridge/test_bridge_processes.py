@@ -132,6 +132,22 @@ def test_without_a_server_it_records_and_sends_later(bench, make_server):
     assert is_slice(bench.server.frames(0), bench.sent())
 
 
+def test_quitting_does_not_wait_for_a_server_that_does_not_want_the_recording(bench):
+    bench.server.refusal = ErrorMessage(code="unknown", message="there is no session nowhere")
+    bench.virtual()
+    bridge = bench.bridge("--session", "nowhere")
+    record_a_curve(bench, bridge, 30)
+    bridge.type(".q")
+    assert bridge.wait() == 1
+    assert "tracemesh-bridge: the server says unknown: there is no session nowhere" in bridge.said
+    bench.server.refusal = None
+    bridge = bench.bridge("--session", "nowhere")
+    bridge.says("server: live")
+    bridge.type("q")
+    assert bridge.wait() == 0
+    assert is_slice(bench.server.frames(0), bench.sent())
+
+
 def test_another_session_gets_a_recording_of_its_own_and_the_old_one_is_sent_too(bench, eventually):
     bench.server.refusal = ErrorMessage(code="forbidden", message="this token may not record")
     bench.virtual()

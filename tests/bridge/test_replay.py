@@ -1,8 +1,10 @@
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from websockets.sync.server import serve
 
-from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Samples, from_device
+from tracemesh.wire.device import CurveEnd, CurveStart, Device, ErrorMessage, Hello, NodeMark, Samples, from_device
 from tracemesh_bridge.cli import main
 from tracemesh_bridge.errors import BridgeError
 from tracemesh_bridge.replay import RecordedFile
@@ -43,6 +45,36 @@ def test_into_another_session_as_another_recording(recording, server):
     assert main(["replay", str(recording), *options]) == 0, "what the server has already is not sent again"
     assert [(h.session, h.recording) for h in server.hellos] == [("t", "again")] * 2
     assert server.stored["again"] == MESSAGES
+
+
+@pytest.mark.parametrize("code", ["unknown", "version", "malformed", "forbidden"])
+def test_what_the_server_will_never_take_ends_with_its_words_and_the_file_stays(recording, server, code, capsys):
+    server.refusal = ErrorMessage(code=code, message="so it is")
+    before = recording.read_bytes()
+    assert main(["replay", str(recording), "--server", server.address]) == 1
+    assert f"tracemesh-bridge: the server says {code}: so it is\n" in capsys.readouterr().err
+    assert recording.read_bytes() == before
+
+
+@pytest.mark.parametrize("code", ["storage", "limit", "gap"])
+def test_what_the_server_cannot_take_now_is_sent_once_it_can(recording, server, code, eventually):
+    server.refusal = ErrorMessage(code=code, message="not now")
+    with ThreadPoolExecutor(1) as background:
+        sending = background.submit(main, ["replay", str(recording), "--server", server.address])
+        eventually(lambda: len(server.hellos) >= 2)
+        server.refusal = None
+        assert sending.result() == 0
+    assert server.stored["r"] == MESSAGES
+
+
+def test_a_token_that_is_missing_ends_it_too(recording, capsys):
+    closed = serve(lambda _: None, "127.0.0.1", 0, process_request=lambda socket, _: socket.respond(403, ""))
+    with closed as listening, ThreadPoolExecutor(1) as background:
+        background.submit(listening.serve_forever)
+        port = listening.socket.getsockname()[1]
+        assert main(["replay", str(recording), "--server", f"http://127.0.0.1:{port}"]) == 1
+        listening.shutdown()
+    assert "the server wants a token, or another one: set TRACEMESH_TOKEN" in capsys.readouterr().err
 
 
 def test_what_a_bridge_spooled_can_be_replayed(bench, server):
