@@ -46,26 +46,33 @@ def test_however_it_arrives_it_is_drawn_alike(moves: list[tuple[int, float]], bl
     ticks = start + np.cumsum([0, *(step for step, _ in moves)])
     angles = np.cumsum([0.0, *(turn for _, turn in moves)])
     drawing = CurveDrawing(DEVICE, boundary=False)
-    collected = []
+    collected, counted = [], []
     for first in range(0, len(ticks), block):
-        number, points = drawing.extend([samples(ticks[first : first + block], angles[first : first + block], first)])
+        number, points, numbers = drawing.extend(
+            [samples(ticks[first : first + block], angles[first : first + block], first)]
+        )
         assert number == sum(map(len, collected))
         collected.append(points)
+        counted.append(numbers)
     path = reckoned(ticks, angles)
     travelled = (ticks - ticks[0]) * WHEEL.circumference / 500
     kept = np.diff(travelled // SPACING, prepend=-1) > 0
     assert np.concatenate(collected) == pytest.approx(path[kept], abs=1e-9)
     assert drawing.positions == pytest.approx(path[kept], abs=1e-9)
+    assert np.concatenate(counted).tolist() == drawing.samples.tolist() == np.flatnonzero(kept).tolist()
 
 
 def test_the_rest_goes_on_where_the_solved_part_ends() -> None:
     drawing = CurveDrawing(DEVICE, boundary=False)
     drawing.extend([samples(np.arange(0, 1000, 10), np.zeros(100), 0)])
     solved = np.array([[5.0, 5, 5], [6, 5, 5]])
-    drawing.settle(solved, last_sample=49)
-    first, points = drawing.extend([samples(np.arange(1000, 1100, 10), np.zeros(10), 100)])
+    drawing.settle(solved, np.array([0, 49]), last_sample=49)
+    first, points, _ = drawing.extend([samples(np.arange(1000, 1100, 10), np.zeros(10), 100)])
     assert first == 2 + np.count_nonzero(drawing.positions[2:, 0] < points[0, 0])
     assert drawing.positions[:2] == pytest.approx(solved)
+    assert drawing.samples[:2].tolist() == [0, 49]
+    assert len(drawing.samples) == len(drawing.positions)
+    assert np.all(np.diff(drawing.samples) > 0)
     assert drawing.positions[2] == pytest.approx([6, 5, 5], abs=2 * SPACING)
     assert drawing.position(49) == pytest.approx([6, 5, 5], abs=1e-9)
 

@@ -71,3 +71,38 @@ def test_what_cannot_be_solved_says_why(server: Any) -> None:
     answer = server.http.post(f"/sessions/{server.new_session()}/preview")
     assert (answer.status_code, "no curve with samples" in answer.json()["detail"]) == (422, True)
     assert server.http.post("/sessions/none/preview").status_code == 404
+
+
+def test_every_point_says_at_which_sample_it_is(server: Any, session: str) -> None:
+    """Marks are points of the network at their own samples, also on a closed curve that begins between two marks."""
+    curves = server.http.get(f"/sessions/{session}/curves").json()
+    marks = sorted({m["node"]: m for m in reversed(curves[0]["marks"])}.values(), key=lambda m: m["sample"])
+    marks = [{"sample": mark["sample"] + 7, "node": mark["node"]} for mark in marks]
+    wish = {"marks": [{"curve": 0, "marks": marks}]}
+    preview = Preview.model_validate(server.http.post(f"/sessions/{session}/preview", json=wish).json())
+    nodes = {node.node: node.position for node in preview.nodes}
+    for curve, known in zip(preview.curves, [marks, curves[1]["marks"], curves[2]["marks"]], strict=True):
+        points, samples = np.reshape(curve.positions, (-1, 3)), np.array(curve.samples)
+        assert len(points) == len(samples)
+        for mark in known:
+            (found,) = np.flatnonzero(samples == mark["sample"])[:1]
+            assert points[found] == pytest.approx(nodes[mark["node"]], abs=2e-5)
+        assert np.count_nonzero(np.diff(samples) < 0) == (1 if curve.closed else 0)
+
+
+def test_marks_that_are_tried_give_what_they_give_when_stored(server: Any, session: str) -> None:
+    path = f"/sessions/{session}"
+    (moved, *_), stored = server.http.get(f"{path}/curves").json()[1]["marks"], server.http.get(f"{path}/curves").json()
+    marks = [{**mark, "sample": mark["sample"] + (3 if mark == moved else 0)} for mark in stored[1]["marks"]]
+    tried = server.http.post(f"{path}/preview", json={"marks": [{"curve": 1, "marks": marks}]}).json()
+    assert server.http.get(f"{path}/curves").json() == stored
+    assert tried["curves"] != server.http.post(f"{path}/preview").json()["curves"]
+    server.http.patch(f"{path}/curves/1", json={"marks": marks})
+    assert server.http.post(f"{path}/preview").json()["curves"] == tried["curves"]
+
+
+def test_marks_where_nothing_is_are_refused(server: Any, session: str) -> None:
+    for curve, sample in ((9, 0), (1, 10**6)):
+        wish = {"marks": [{"curve": curve, "marks": [{"sample": sample, "node": 0}]}]}
+        answer = server.http.post(f"/sessions/{session}/preview", json=wish)
+        assert (answer.status_code, f"curve {curve}" in answer.json()["detail"]) == (422, True)

@@ -214,6 +214,16 @@ export interface CurveEnd {
   type: "curve.end";
 }
 /**
+ * Marks of one curve.
+ */
+export interface CurveMarks {
+  /**
+   * index within the session
+   */
+  curve: number;
+  marks: Mark[];
+}
+/**
  * A curve begins; its samples and nodes refer to its number.
  */
 export interface CurveStart {
@@ -349,6 +359,10 @@ export interface LiveCurve {
   ended: boolean;
   index: number;
   positions: number[];
+  /**
+   * for each point, the sample of the curve that it is at
+   */
+  samples: number[];
 }
 /**
  * A curve ends.
@@ -436,6 +450,10 @@ export interface LivePoints {
   first: number;
   index: number;
   positions: number[];
+  /**
+   * for each point, the sample of the curve that it is at
+   */
+  samples: number[];
   type: "live.points";
 }
 /**
@@ -578,6 +596,41 @@ export interface Preview {
   report: {
     [k: string]: unknown;
   };
+}
+/**
+ * POST /sessions/{session}/preview.
+ */
+export interface PreviewWish {
+  /**
+   * smoothing length of the bend term, m
+   */
+  bend: number | null;
+  curve_bias: "auto" | "on" | "off";
+  /**
+   * find the nodes that are not marked; those marked already are kept
+   */
+  infer_nodes: boolean;
+  /**
+   * tried out instead of the marks that these curves have
+   */
+  marks: CurveMarks[];
+  /**
+   * let the surface leave a noisy network a little
+   */
+  soft: boolean;
+  /**
+   * distance of the network's points: % of the estimated diagonal, or m
+   */
+  step: string;
+  /**
+   * smoothing length of the stretch term, m
+   */
+  stretch: number | null;
+  /**
+   * also span the surface, not only the network
+   */
+  surface: boolean;
+  weights: "auto" | "thesis";
 }
 /**
  * RFC 9457 problem details: the one error envelope of the API.

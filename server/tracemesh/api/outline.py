@@ -5,7 +5,6 @@ from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.api.live.drawing import flat
 from tracemesh.api.live.tracker import SessionTracker
-from tracemesh.errors import NotFound
 from tracemesh.formats.networks import read_network
 from tracemesh.geometry.scan import Floats
 from tracemesh.storage.artifacts import ArtifactStore, artifact_row
@@ -31,10 +30,7 @@ def outline(transaction: Transaction, store: ArtifactStore, session: str) -> Out
 
 def _of_network(transaction: Transaction, store: ArtifactStore, reconstruction: str) -> Outline:
     path = store.path(artifact_row(transaction, reconstruction, "network.json").sha256)
-    try:
-        network = read_network(path.read_text("utf-8"))
-    except OSError:
-        raise NotFound(f"the network of reconstruction {reconstruction} is lost") from None
+    network = read_network(path.read_text("utf-8"))
     return Outline(curves=[_line(s.boundary, network.points[s.points]) for s in network.segments])
 
 

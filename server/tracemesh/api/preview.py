@@ -7,17 +7,19 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
 from tracemesh.api.live.drawing import flat
-from tracemesh.errors import Conflict, TracemeshError
+from tracemesh.errors import Conflict, InputError, TracemeshError
 from tracemesh.formats.rawnet import write_rawnet
+from tracemesh.formats.recordings import with_marks
+from tracemesh.geometry.curves.closed_curves import begun_at_nodes
 from tracemesh.geometry.scan import Floats, Scan
 from tracemesh.jobs.attached import SolvedNetwork, solve_network
 from tracemesh.jobs.proposals import propose_nodes
 from tracemesh.jobs.slot import Slot
 from tracemesh.storage.curves import list_curves
 from tracemesh.storage.database import Database
-from tracemesh.storage.scans import load_scan
+from tracemesh.storage.scans import load_sent
 from tracemesh.wire.live import LiveCurve, Preview
-from tracemesh.wire.resources import Curve, NodePosition, NodeProposals, ReconstructionParameters
+from tracemesh.wire.resources import Curve, CurveMarks, NodePosition, NodeProposals, PreviewWish
 
 MAX_SCANS = 8
 """Sessions whose scan is kept in memory."""
@@ -45,18 +47,19 @@ class Previewer:
         """The session's scan is not what it was."""
         self._scans.pop(session, None)
 
-    async def solve(self, session: str, client: str, parameters: ReconstructionParameters) -> Preview:
-        """The network with these parameters.
+    async def solve(self, session: str, client: str, wanted: PreviewWish) -> Preview:
+        """The network with these parameters and marks.
 
-        Raises NotFound, ScanError, and Conflict when the same client asked for another one meanwhile.
+        Raises NotFound, InputError, ScanError, and Conflict when the same client asked for another one meanwhile.
         """
         wish = self._newest[session, client] = object()
         try:
             scan, indices, curves = await self._scan(session)
+            scan = _marked(scan, indices, wanted.marks)
             async with self._turn:
                 if self._newest.get((session, client)) is not wish:
                     raise Conflict("the same client asked for another preview meanwhile")
-                return _preview(await self._run(solve_network, scan, indices, parameters), curves)
+                return _preview(await self._run(solve_network, scan, indices, wanted), curves)
         finally:
             if self._newest.get((session, client)) is wish:
                 del self._newest[session, client]
@@ -66,12 +69,12 @@ class Previewer:
         scan, indices, curves = await self._scan(session)
         by_index = {curve.index: curve for curve in curves}
         async with self._turn:
-            return await self._run(propose_nodes, scan, [by_index[i] for i in indices])
+            return await self._run(propose_nodes, begun_at_nodes(scan), [by_index[i] for i in indices])
 
     async def rawnet(self, session: str) -> str:
         """The session's scan as a rawnet; raises NotFound and ScanError."""
         scan, _, _ = await self._scan(session)
-        return await asyncio.to_thread(write_rawnet, scan)
+        return await asyncio.to_thread(write_rawnet, begun_at_nodes(scan))
 
     async def _run(self, function: Callable[..., T], *arguments: object) -> T:
         try:
@@ -98,9 +101,23 @@ class Previewer:
 
         def read() -> Loaded:
             with self._database.read() as transaction:
-                return *load_scan(transaction, session), list_curves(transaction, session)
+                return *load_sent(transaction, session), list_curves(transaction, session)
 
         return await asyncio.to_thread(read)
+
+
+def _marked(scan: Scan, indices: Sequence[int], wanted: Sequence[CurveMarks]) -> Scan:
+    """The scan with other marks on some of its curves; raises InputError where there is no such curve or sample."""
+    curves = list(scan.curves)
+    for change in wanted:
+        if change.curve not in indices:
+            raise InputError(f"there is no curve {change.curve} with samples to mark")
+        place = indices.index(change.curve)
+        count = len(curves[place].distance)
+        if beyond := [mark.sample for mark in change.marks if mark.sample >= count]:
+            raise InputError(f"curve {change.curve} has {count} samples, got a mark at sample {beyond[0]}")
+        curves[place] = with_marks(curves[place], [(mark.sample, mark.node) for mark in change.marks])
+    return Scan(tuple(curves))
 
 
 def _preview(solved: SolvedNetwork, curves: Sequence[Curve]) -> Preview:
@@ -112,6 +129,7 @@ def _preview(solved: SolvedNetwork, curves: Sequence[Curve]) -> Preview:
                 closed=curve.closed,
                 ended=curve.ended,
                 positions=flat(solved.curves[curve.index].positions),
+                samples=solved.curves[curve.index].samples.tolist(),
             )
             for curve in curves
             if curve.index in solved.curves

@@ -1,7 +1,7 @@
 """Recordings: what a device sent, as newline-delimited JSON of wire messages; and the scan that they amount to."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from tracemesh.errors import InputError, ScanError
 from tracemesh.formats.calibrations import calibrate
-from tracemesh.geometry.curves.closed_curves import from_first_node
+from tracemesh.geometry.curves.closed_curves import begun_at_nodes
 from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 from tracemesh.geometry.sensing.fusion import frames_from_imu
@@ -78,7 +78,14 @@ def write_recording(recording: Recording) -> str:
 
 
 def scan_from_recordings(recordings: Sequence[Recording]) -> Scan:
-    """All curves of all recordings, in order, less those discarded and those without samples.
+    """All curves of all recordings, in order, less those discarded and those without samples; closed ones go from
+    their first node around to it. Raises what `scan_as_sent` raises.
+    """
+    return begun_at_nodes(scan_as_sent(recordings))
+
+
+def scan_as_sent(recordings: Sequence[Recording]) -> Scan:
+    """The same, with every curve's samples in the order in which they were sent.
 
     Raises InputError where messages contradict each other, ScanError where a curve's numbers make no sense; both name
     the curve, counted from 1 over everything.
@@ -222,13 +229,22 @@ def _curve(raw: _RawCurve, device: Device) -> CurveScan:
     samples, ids = _marks(raw)
     tangent, normal = _orientation(columns, device)
     distance = _distance(columns, device, tangent, normal, samples)
-    scan = CurveScan(
+    return CurveScan(
         distance, tangent, normal, samples, ids, raw.boundary, raw.closed,
         columns.get("acceleration"), columns.get("magnetic"), columns.get("time"),
         timed=columns.keys().isdisjoint({"distance", "ticks"}),
         calibration=right.label,
     )  # fmt: skip
-    return from_first_node(scan) if raw.closed else scan
+
+
+def with_marks(curve: CurveScan, marks: Sequence[tuple[int, int]]) -> CurveScan:
+    """A curve as sent with these marks (sample, node) instead of its own; what was timed is timed anew between them."""
+    samples, ids = np.array(sorted(marks), np.int64).reshape(-1, 2).T
+    distance = curve.distance
+    if curve.timed and curve.time is not None:
+        frames = np.stack([curve.tangent, curve.normal, np.cross(curve.tangent, curve.normal)], axis=2)
+        distance = distance_from_time(curve.time, frames, samples)
+    return replace(curve, distance=distance, node_samples=samples, node_ids=ids)
 
 
 def _joined(blocks: Sequence[Samples]) -> dict[str, Floats]:

@@ -9,19 +9,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracemesh.errors import ScanError
+from tracemesh.geometry.curves.closed_curves import as_scanned, begun_at_nodes
 from tracemesh.geometry.network import CurveNetwork
-from tracemesh.geometry.scan import CurveScan, Floats, Scan
+from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 from tracemesh.storage.curves import curve_rows
 from tracemesh.storage.database import Database
-from tracemesh.storage.scans import load_scan
+from tracemesh.storage.scans import load_sent
 from tracemesh.wire.resources import ReconstructionParameters
 
 
 @dataclass(frozen=True)
 class SolvedCurve:
-    """positions: (n, 3) m, world, from the curve's beginning to its sample `last_sample`."""
+    """positions: (n, 3) m, world, from the curve's beginning to its sample `last_sample`. samples: (n,) the sample, as
+    sent, that each of them is nearest to.
+    """
 
     positions: Floats
+    samples: Ints
     last_sample: int
 
 
@@ -39,7 +43,7 @@ def solve_attached(database_url: str, session: str) -> SolvedNetwork | None:
     database = Database(database_url)
     try:
         with database.read() as transaction:
-            scan, indices = load_scan(transaction, session)
+            scan, indices = load_sent(transaction, session)
             ended = {row.index for row in curve_rows(transaction, session) if row.ended}
         ready = [i for i, c in enumerate(scan.curves) if len(c.node_samples) > 1 or indices[i] in ended]
         chosen = largest_piece(scan.curves, ready)
@@ -66,26 +70,46 @@ def largest_piece(curves: Sequence[CurveScan], candidates: Sequence[int]) -> lis
 def solve_network(
     scan: Scan, indices: Sequence[int], parameters: ReconstructionParameters | None = None
 ) -> SolvedNetwork:
-    """The network of a scan whose curves have these indices in the session; raises ScanError."""
+    """The network of a scan, as it was sent, whose curves have these indices in the session; raises ScanError."""
     from tracemesh.geometry.curves.reconstruction import reconstruct_network
     from tracemesh.pipeline import network_parameters
 
-    result = reconstruct_network(scan, network_parameters(parameters or ReconstructionParameters()))
+    begun = begun_at_nodes(scan)
+    result = reconstruct_network(begun, network_parameters(parameters or ReconstructionParameters()))
     network = result.network
     numbers = np.unique(np.concatenate([curve.node_ids for curve in scan.curves]))
     curves = {
-        index: SolvedCurve(_along(network, i), _last_sample(curve))
-        for i, (index, curve) in enumerate(zip(indices, scan.curves, strict=True))
+        index: _solved(network, i, curve, sent)
+        for i, (index, curve, sent) in enumerate(zip(indices, begun.curves, scan.curves, strict=True))
     }
     nodes = {int(n): network.points[p] for n, p in zip(numbers, network.nodes, strict=False)}
     return SolvedNetwork(curves, nodes, result.report)
 
 
-def _along(network: CurveNetwork, curve: int) -> Floats:
-    """Points (n, 3) of one curve from its beginning to its end."""
-    segments = [segment.points for segment in network.segments if segment.curve == curve]
-    positions: Floats = network.points[np.concatenate([segments[0], *(points[1:] for points in segments[1:])])]
-    return positions
+def _solved(network: CurveNetwork, index: int, curve: CurveScan, sent: CurveScan) -> SolvedCurve:
+    """One curve from its beginning to its end."""
+    parts = [network.points[segment.points] for segment in network.segments if segment.curve == index]
+    positions = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+    return SolvedCurve(positions, as_scanned(sent, _samples_along(parts, curve)), _last_sample(curve))
+
+
+def _samples_along(parts: Sequence[Floats], curve: CurveScan) -> Ints:
+    """The sample (n,) where as much of its segment was travelled as at each point of a curve's segments."""
+    last = len(curve.distance) - 1
+    for ends in (curve.node_samples, np.unique([0, *curve.node_samples, last])):
+        if len(ends) == len(parts) + 1:
+            found = [_samples_of(part, curve.distance, a, b) for part, a, b in zip(parts, ends, ends[1:], strict=False)]
+            return np.concatenate([found[0], *(samples[1:] for samples in found[1:])])
+    return _samples_of(np.concatenate([parts[0], *(part[1:] for part in parts[1:])]), curve.distance, 0, last)
+
+
+def _samples_of(points: Floats, distance: Floats, first: int, last: int) -> Ints:
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    travelled = np.maximum.accumulate(distance[first : last + 1] - distance[first])
+    wanted = arc / max(arc[-1], np.finfo(float).tiny) * travelled[-1]
+    samples: Ints = first + np.rint(np.interp(wanted, travelled, np.arange(len(travelled)))).astype(np.int64)
+    samples[[0, -1]] = first, last
+    return samples
 
 
 def _last_sample(curve: CurveScan) -> int:

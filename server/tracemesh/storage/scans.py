@@ -5,7 +5,8 @@ from collections import defaultdict
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import ScanError
-from tracemesh.formats.recordings import Recording, scan_from_recordings
+from tracemesh.formats.recordings import Recording, scan_as_sent
+from tracemesh.geometry.curves.closed_curves import begun_at_nodes
 from tracemesh.geometry.scan import Scan
 from tracemesh.storage.curves import curve_rows, marks_of
 from tracemesh.storage.devices import corrected_hello
@@ -19,7 +20,15 @@ Blocks = dict[int, list[Samples]]
 
 
 def load_scan(transaction: Transaction, session: str) -> tuple[Scan, list[int]]:
-    """Everything scanned in a session and, for each curve of the scan, its index in the session.
+    """Everything scanned in a session, closed curves begun at their first node, and, for each curve of the scan, its
+    index in the session. Raises what `load_sent` raises.
+    """
+    scan, indices = load_sent(transaction, session)
+    return begun_at_nodes(scan), indices
+
+
+def load_sent(transaction: Transaction, session: str) -> tuple[Scan, list[int]]:
+    """The same, with every curve's samples in the order in which they were sent.
 
     Raises NotFound, and ScanError when there is nothing to reconstruct or a curve cannot be understood.
     """
@@ -29,7 +38,7 @@ def load_scan(transaction: Transaction, session: str) -> tuple[Scan, list[int]]:
         raise ScanError(f"session {session} has no curve with samples")
     blocks = {key: sample_blocks(transaction, key) for key in {row.recording_key for row in rows}}
     recordings = [_edited(transaction, row, blocks[row.recording_key][row.number]) for row in rows]
-    return scan_from_recordings(recordings), [row.index for row in rows]
+    return scan_as_sent(recordings), [row.index for row in rows]
 
 
 def sample_blocks(transaction: Transaction, key: int) -> Blocks:

@@ -20,6 +20,7 @@ class LiveCurve(Message):
     closed: bool = False
     ended: bool = False
     positions: list[float] = Field(default=[])
+    samples: list[Count] = Field(default=[], description="for each point, the sample of the curve that it is at")
 
 
 class LiveDevice(Message):
@@ -63,6 +64,7 @@ class LivePoints(Message):
     index: Count
     first: Count = Field(description="number of the first of these points within the curve as drawn")
     positions: list[float]
+    samples: list[Count] = Field(default=[], description="for each point, the sample of the curve that it is at")
 
 
 class LiveNode(Message):

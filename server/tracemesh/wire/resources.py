@@ -167,6 +167,21 @@ class ReconstructionParameters(Message):
     surface: bool = Field(default=True, description="also span the surface, not only the network")
 
 
+class CurveMarks(Message):
+    """Marks of one curve."""
+
+    curve: Count = Field(description="index within the session")
+    marks: list[Mark] = Field(max_length=10_000)
+
+
+class PreviewWish(ReconstructionParameters):
+    """POST /sessions/{session}/preview."""
+
+    marks: list[CurveMarks] = Field(
+        default=[], max_length=1000, description="tried out instead of the marks that these curves have"
+    )
+
+
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 

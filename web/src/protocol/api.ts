@@ -4,6 +4,7 @@ import type {
   NodeProposals,
   Outline,
   Preview,
+  PreviewWish,
   Problem,
   Reconstruction,
   ReconstructionParameters,
@@ -87,9 +88,9 @@ export class Api {
     return this.#json<Reconstruction>("POST", `/sessions/${session}/reconstructions`, JSON.stringify(parameters));
   }
 
-  /** The network with these parameters, at once; refused (409) when the same client asked again meanwhile. */
-  preview(session: string, client: string, parameters: Partial<ReconstructionParameters>): Promise<Preview> {
-    return this.#json<Preview>("POST", `/sessions/${session}/preview?client=${client}`, JSON.stringify(parameters));
+  /** The network with these parameters and marks, at once; refused (409) when the same client asked again meanwhile. */
+  preview(session: string, client: string, wish: Partial<PreviewWish>): Promise<Preview> {
+    return this.#json<Preview>("POST", `/sessions/${session}/preview?client=${client}`, JSON.stringify(wish));
   }
 
   proposals(session: string): Promise<NodeProposals> {

@@ -37,4 +37,18 @@ describe("History", () => {
     expect(history.last).toBeUndefined();
     await history.undo();
   });
+
+  it("does one thing after another, however soon they are asked for", async () => {
+    const [word, history]: [string[], History] = [[], new History()];
+    const slowly = (letter: string): Command => ({
+      label: letter,
+      run: () => new Promise((resolve) => setTimeout(() => resolve(void word.push(letter)), 5)),
+      revert: () => new Promise((resolve) => setTimeout(() => resolve(void word.pop()), 5)),
+    });
+    const plan = (): Promise<Command> => Promise.resolve(slowly(String(word.length)));
+    await Promise.all([history.do(slowly("a")), history.plan(plan), history.undo(), history.undo(), history.redo()]);
+    expect([word, history.last?.label, history.undone.length]).toEqual([["a"], "a", 1]);
+    await history.plan(() => Promise.resolve(undefined));
+    expect(history.last?.label).toBe("a");
+  });
 });

@@ -1,6 +1,6 @@
 import { expect, it } from "vitest";
 import type { Curve } from "../wire.gen";
-import { marksWith, newNode, sameMarks, unmarked } from "./marks";
+import { marksChanged, marksWith, newNode, placesOf, roomFor, sameMarks, unmarked } from "./marks";
 
 const marks = [
   { sample: 0, node: 1 },
@@ -35,4 +35,31 @@ it("leaves of proposals what is not marked yet", () => {
   expect(unmarked([half, whole, fresh], curves)).toEqual([{ ...half, places: places.slice(1) }, fresh]);
   expect(newNode(curves)).toBe(3);
   expect(newNode([])).toBe(0);
+});
+
+it("moves, renames and takes away one mark and leaves the others", () => {
+  const first = marks[0] as (typeof marks)[0];
+  expect(marksChanged(marks, first, { sample: 95 })).toEqual([marks[1], { sample: 95, node: 1 }]);
+  expect(marksChanged(marks, first, { node: 7 })).toEqual([{ sample: 0, node: 7 }, marks[1]]);
+  expect(marksChanged(marks, first, undefined)).toEqual([marks[1]]);
+  expect(marksChanged(marks, { sample: 1, node: 1 }, undefined)).toEqual(marks);
+});
+
+it("lets a mark move between its neighbours only", () => {
+  const three = [...marks, { sample: 120, node: 3 }];
+  expect(roomFor(three, 90, 200)).toEqual([1, 119]);
+  expect(roomFor(three, 0, 200)).toEqual([0, 89]);
+  expect(roomFor(three, 120, 200)).toEqual([91, 199]);
+});
+
+it("finds every mark of a node, also two on one curve", () => {
+  const curves = [
+    { index: 0, marks: [...marks, { sample: 120, node: 1 }] },
+    { index: 3, marks },
+  ] as Curve[];
+  expect(placesOf(curves, 1)).toEqual([
+    { curve: 0, sample: 0 },
+    { curve: 0, sample: 120 },
+    { curve: 3, sample: 0 },
+  ]);
 });

@@ -23,3 +23,30 @@ export function unmarked(proposals: readonly NodeProposal[], curves: readonly Cu
 export function newNode(curves: readonly Curve[]): number {
   return Math.max(-1, ...curves.flatMap((curve) => curve.marks.map((mark) => mark.node))) + 1;
 }
+
+/** A mark of a node on a curve. */
+export interface MarkPlace {
+  readonly curve: number;
+  readonly sample: number;
+}
+
+/** Where a node is marked, curve by curve. */
+export function placesOf(curves: readonly Curve[], node: number): MarkPlace[] {
+  return curves.flatMap(({ index, marks }) =>
+    marks.filter((mark) => mark.node === node).map(({ sample }) => ({ curve: index, sample })),
+  );
+}
+
+/** First and last sample that a mark of a curve may move to: between its neighbours, one sample away from each. */
+export function roomFor(marks: readonly Mark[], sample: number, count: number): readonly [number, number] {
+  const before = marks.filter((mark) => mark.sample < sample).map((mark) => mark.sample + 1);
+  const after = marks.filter((mark) => mark.sample > sample).map((mark) => mark.sample - 1);
+  return [Math.max(0, ...before), Math.min(count - 1, ...after)];
+}
+
+/** A curve's marks with the one at a sample changed, or taken away; in the order of the samples. */
+export function marksChanged(marks: readonly Mark[], { sample, node }: Mark, to: Partial<Mark> | undefined): Mark[] {
+  const isIt = (mark: Mark): boolean => mark.sample === sample && mark.node === node;
+  const changed = marks.flatMap((mark) => (isIt(mark) ? (to ? [{ ...mark, ...to }] : []) : [mark]));
+  return changed.sort((a, b) => a.sample - b.sample);
+}

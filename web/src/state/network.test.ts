@@ -8,6 +8,7 @@ const points = (index: number, first: number, positions: number[]): ToBrowser =>
   index,
   first,
   positions,
+  samples: [],
 });
 
 describe("Points", () => {
@@ -58,7 +59,7 @@ describe("Network", () => {
     const network = new Network();
     network.apply(start(0));
     network.apply(start(1));
-    const solved = { index: 1, boundary: true, closed: false, ended: true, positions: [1, 2, 3] };
+    const solved = { index: 1, boundary: true, closed: false, ended: true, positions: [1, 2, 3], samples: [4] };
     const nodes = [{ node: 0, position: [1, 2, 3] as [number, number, number] }];
     expect(network.apply({ type: "live.network", curves: [solved], nodes })).toBe("replaced");
     expect([...network.curves.keys()]).toEqual([1]);

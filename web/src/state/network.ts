@@ -5,10 +5,13 @@ import type { ToBrowser } from "../protocol/messages";
 export class Points {
   #data: Float32Array;
   #length = 0;
+  #samples: number[];
 
-  constructor(positions: ArrayLike<number> = []) {
+  /** `samples`: for each point the sample of its curve that it is at; empty where that is not known. */
+  constructor(positions: ArrayLike<number> = [], samples: readonly number[] = []) {
     this.#data = Float32Array.from(positions);
     this.#length = positions.length;
+    this.#samples = [...samples];
   }
 
   /** Number of points. */
@@ -21,9 +24,16 @@ export class Points {
     return this.#data.subarray(0, this.#length);
   }
 
+  /** The sample of its curve that each point is at; empty where that is not known. */
+  get samples(): readonly number[] {
+    return this.#samples;
+  }
+
   /** Replace everything from point `first` on; false when points before `first` are missing. */
-  splice(first: number, positions: ArrayLike<number>): boolean {
+  splice(first: number, positions: ArrayLike<number>, samples: readonly number[] = []): boolean {
     if (first > this.count) return false;
+    this.#samples.length = Math.min(first, this.#samples.length);
+    for (const sample of samples) this.#samples.push(sample);
     const length = 3 * first + positions.length;
     if (length > this.#data.length) this.#grow(length);
     this.#data.set(positions, 3 * first);
@@ -66,9 +76,9 @@ export class Network {
       case "live.network":
         return this.#replace(message.curves, message.nodes);
       case "live.curve.start":
-        return this.#set({ ...message, closed: false, ended: false, positions: [] });
+        return this.#set({ ...message, closed: false, ended: false, positions: [], samples: [] });
       case "live.points":
-        return this.curves.get(message.index)?.points.splice(message.first, message.positions) ? "grown" : "gap";
+        return this.curves.get(message.index)?.points.splice(message.first, message.positions, message.samples) ? "grown" : "gap";
       case "live.curve.end":
         return this.#end(message.index, message.closed);
       case "live.node":
@@ -88,8 +98,8 @@ export class Network {
   }
 
   #set(curve: LiveCurve): Change {
-    const { index, boundary, closed, ended, positions } = curve;
-    this.curves.set(index, { index, boundary, closed, ended, points: new Points(positions) });
+    const { index, boundary, closed, ended, positions, samples } = curve;
+    this.curves.set(index, { index, boundary, closed, ended, points: new Points(positions, samples) });
     return "grown";
   }
 

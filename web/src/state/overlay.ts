@@ -13,6 +13,16 @@ export interface Ruler {
   readonly text: string;
 }
 
+/** What a person who edits nodes has in hand. */
+export interface Editing {
+  /** Where the next mark would be, or where the node that is drawn along goes. */
+  readonly cursor: Place | undefined;
+  /** The node that is chosen or drawn along. */
+  readonly node: number | undefined;
+  /** The node that it would become one with. */
+  readonly onto: number | undefined;
+}
+
 /** What lies over the 3D view, in CSS px. */
 export interface OverlayContent {
   readonly labels: readonly Placement[];
@@ -21,6 +31,8 @@ export interface OverlayContent {
   /** Points that a person picked, or that a plot points at. */
   readonly marks: readonly Place[];
   readonly ruler: Ruler | undefined;
+  /** Undefined while nodes are not edited. */
+  readonly editing: Editing | undefined;
   readonly metresPerPixel: number;
   /** World axes x, y, z as the eye sees them: right, up and towards it, for each. */
   readonly axes: readonly [Vector, Vector, Vector];
@@ -31,6 +43,7 @@ export const EMPTY_OVERLAY: OverlayContent = {
   tips: [],
   marks: [],
   ruler: undefined,
+  editing: undefined,
   metresPerPixel: 0,
   axes: [
     [1, 0, 0],

@@ -70,6 +70,7 @@ export function networkFromFile(file: NetworkFile, marked: readonly number[] = [
       closed: points[0] === points.at(-1),
       ended: true,
       positions: points.flatMap((i) => [...(file.points[i] ?? [])]),
+      samples: [],
     })),
     nodes: file.nodes.map((point, i) => ({ node: marked[i] ?? i, position: [...(file.points[point] ?? [0, 0, 0])] })),
   });

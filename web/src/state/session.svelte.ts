@@ -4,12 +4,10 @@ import type { ToBrowser } from "../protocol/messages";
 import { polylineLength } from "../geometry/vectors";
 import type {
   Curve,
+  CurveMarks,
+  CurveUpdate,
   LiveDevice,
-  Mark,
-  NodeProposal,
-  NodeProposals,
   Reconstruction,
-  ReconstructionParameters,
   RecordingSummary,
   Session,
 } from "../wire.gen";
@@ -17,8 +15,8 @@ import { putIn } from "./files";
 import { History } from "./history.svelte";
 import { Network } from "./network";
 import { Latest } from "./latest";
-import { marksWith, newNode, sameMarks, unmarked } from "./marks";
 import { newName } from "./names";
+import { ParametersStore } from "./parameters.svelte";
 import { loadResult, type Report, type Result } from "./result";
 
 /** A curve as the list of curves names it. */
@@ -31,10 +29,18 @@ export interface CurveEntry {
   readonly length: number;
 }
 
-/** What a person may change about a curve with one click. */
-export type CurveFlag = "boundary" | "closed" | "removed";
+/** A change of one curve, as it is stored. */
+export interface CurveChange {
+  readonly index: number;
+  readonly change: Partial<CurveUpdate>;
+}
+
+/** What to draw before it is stored: parameters as they are, on some curves other marks. */
+type Trial = readonly CurveMarks[];
 
 const LIST_PAUSE = 250;
+/** Status of a preview that the same page has overtaken. */
+const OVERTAKEN = 409;
 /** ms without a word of a running job after which it is asked. */
 const SILENCE = 2000;
 
@@ -43,6 +49,7 @@ const SILENCE = 2000;
 export class SessionStore {
   readonly live = new Network();
   readonly history = new History();
+  readonly parameters = new ParametersStore();
   session = $state<Session>();
   connection = $state<Connection>("connecting");
   devices = $state.raw<readonly LiveDevice[]>([]);
@@ -56,8 +63,8 @@ export class SessionStore {
   result = $state.raw<Result>();
   /** The network with parameters that a hand is moving. */
   preview = $state.raw<{ readonly network: Network; readonly report: Report }>();
-  /** Nodes that the server found, to be accepted or refused; undefined while nobody asked. */
-  proposals = $state.raw<NodeProposals>();
+  /** The curves as the server has them, with their marks. */
+  details = $state.raw<readonly Curve[]>([]);
   recordings = $state.raw<readonly RecordingSummary[]>([]);
   problem = $state("");
   /** Counts changes of the drawn network. */
@@ -68,12 +75,19 @@ export class SessionStore {
   /** The newest reconstruction whose results were asked for: none is shown twice, none after a newer one. */
   #loading: string | undefined;
   readonly #client = newName("page");
-  readonly #previews = new Latest((parameters: Partial<ReconstructionParameters>) => this.#try(parameters));
+  readonly #previews = new Latest((trial: Trial) => this.#try(trial));
+  /** Whether the surface follows edits, as it does from the first one on until more is scanned. */
+  #follows = false;
+  /** Whether the result is older than an edit. */
+  #stale = false;
+  /** Whether somebody points at curves. */
+  #pointed = false;
+  #detailsTimer: ReturnType<typeof setTimeout> | undefined;
   #listTimer: ReturnType<typeof setTimeout> | undefined;
   #progressTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
-    private readonly api: Api,
+    readonly api: Api,
     readonly id: string,
   ) {}
 
@@ -100,6 +114,7 @@ export class SessionStore {
 
   close(): void {
     clearTimeout(this.#listTimer);
+    clearTimeout(this.#detailsTimer);
     clearTimeout(this.#progressTimer);
     this.#socket?.close();
   }
@@ -118,110 +133,66 @@ export class SessionStore {
   }
 
   async rename(name: string): Promise<void> {
-    await this.#command(async () => (this.session = await this.api.renameSession(this.id, name)));
+    await this.command(async () => (this.session = await this.api.renameSession(this.id, name)));
   }
 
   /** Take in files as if devices had sent them. */
   async upload(files: readonly File[]): Promise<void> {
-    await this.#command(async () => {
+    await this.command(async () => {
       for (const file of files) await putIn(this.api, this.id, file);
       this.#outdate();
     });
   }
 
-  /** Begin a reconstruction; one that is under way is not wanted any more. */
-  async reconstruct(parameters: Partial<ReconstructionParameters>): Promise<void> {
+  /** Begin a reconstruction with the parameters as they are; one that is under way is not wanted any more. */
+  async reconstruct(): Promise<void> {
     const before = this.reconstruction;
-    await this.#command(async () => this.#progressed(await this.api.reconstruct(this.id, parameters)));
+    const { request } = this.parameters;
+    await this.command(async () => this.#progressed(await this.api.reconstruct(this.id, request)));
     if (before && isBusy(before)) await this.api.cancel(before.id).catch(() => undefined);
   }
 
-  /** Draw the network with these parameters as soon as it can be had; only the newest wish counts. */
-  tryOut(parameters: Partial<ReconstructionParameters>): void {
-    void this.#previews.want(parameters);
+  /** Draw the network with the parameters as they are as soon as it can be had; only the newest wish counts. */
+  tryOut(marks: Trial = []): void {
+    void this.#previews.want(marks);
+  }
+
+  /** Draw a network whose points know their samples, so that its curves can be pointed at. */
+  needSamples(): void {
+    this.#pointed = true;
+    if (this.scanned && !this.preview && this.result) this.tryOut();
   }
 
   async cancel(): Promise<void> {
     const { reconstruction } = this;
-    if (reconstruction) await this.#command(async () => this.#progressed(await this.api.cancel(reconstruction.id)));
+    if (reconstruction) await this.command(async () => this.#progressed(await this.api.cancel(reconstruction.id)));
   }
 
-  /** Change a curve; can be taken back. */
-  async edit(curve: CurveEntry, flag: CurveFlag, value: boolean): Promise<void> {
-    const set = async (to: boolean): Promise<void> => {
-      await this.api.updateCurve(this.id, curve.index, { [flag]: to });
-      this.#outdate();
-    };
-    const label = `curve ${curve.index + 1} ${nowIs(flag, value)}`;
-    await this.#command(() => this.history.do({ label, run: () => set(value), revert: () => set(!value) }));
+  /** Store these changes of curves. */
+  async write(changes: readonly CurveChange[]): Promise<void> {
+    for (const { index, change } of changes) await this.api.updateCurve(this.id, index, change);
+    await this.#listDetails();
+    this.#edited();
   }
 
-  /** Ask the server where curves seem to meet without a mark. */
-  async findNodes(): Promise<void> {
-    await this.#command(async () => {
-      const [found, curves] = await Promise.all([this.api.proposals(this.id), this.api.curves(this.id)]);
-      this.proposals = { ...found, proposals: unmarked(found.proposals, curves) };
-    });
-  }
-
-  /** Mark a proposed node on its curves; can be taken back. */
-  async accept(proposal: NodeProposal): Promise<void> {
-    const number = (curves: readonly Curve[]): number => proposal.node ?? newNode(curves);
-    await this.#editMarks(
-      (curves) => `node ${number(curves)} marked`,
-      ({ index, marks }, curves) =>
-        marksWith(marks, proposal.places.filter((place) => place.curve === index), number(curves)),
-    );
-    this.refuse(proposal);
-  }
-
-  /** Take a proposal off the list. */
-  refuse(proposal: NodeProposal): void {
-    const { proposals } = this;
-    if (proposals) this.proposals = { ...proposals, proposals: proposals.proposals.filter((p) => p !== proposal) };
-  }
-
-  /** Let all marks of a node name another one, which joins the two if both exist; undefined deletes them. */
-  async editNode(node: number, to: number | undefined): Promise<void> {
-    await this.#editMarks(
-      () => `node ${node} ${to === undefined ? "deleted" : `is now ${to}`}`,
-      ({ marks }) =>
-        to === undefined
-          ? marks.filter((mark) => mark.node !== node)
-          : marks.map((mark) => (mark.node === node ? { ...mark, node: to } : mark)),
-    );
+  /** What the server knows of a curve. */
+  detailsOf(curve: number): Curve | undefined {
+    return this.details.find(({ index }) => index === curve);
   }
 
   async undo(): Promise<void> {
-    await this.#command(() => this.history.undo());
+    await this.command(() => this.history.undo());
   }
 
   async redo(): Promise<void> {
-    await this.#command(() => this.history.redo());
-  }
-
-  /** Replace the marks of every curve that `edited` changes; can be taken back. */
-  async #editMarks(
-    label: (curves: readonly Curve[]) => string,
-    edited: (curve: Curve, curves: readonly Curve[]) => Mark[],
-  ): Promise<void> {
-    await this.#command(async () => {
-      const curves = await this.api.curves(this.id);
-      const changes = curves
-        .map((curve) => ({ index: curve.index, old: curve.marks, fresh: edited(curve, curves) }))
-        .filter(({ old, fresh }) => !sameMarks(old, fresh));
-      const set = async (which: "old" | "fresh"): Promise<void> => {
-        for (const change of changes) await this.api.updateCurve(this.id, change.index, { marks: change[which] });
-        this.#outdate();
-      };
-      await this.history.do({ label: label(curves), run: () => set("fresh"), revert: () => set("old") });
-    });
+    await this.command(() => this.history.redo());
   }
 
   #fold(message: Exclude<ToBrowser, LiveDevice | { type: "live.reconstruction" }>): void {
     const change = this.live.apply(message);
     if (change === "gap") return this.#socket?.restart();
     if (message.type === "live.snapshot" || message.type === "live.curve.start") void this.#listRecordings();
+    if (message.type !== "live.points") this.#detailsSoon();
     if (message.type === "live.snapshot") {
       this.known = true;
       this.#heard(message.devices);
@@ -243,7 +214,15 @@ export class SessionStore {
     this.reconstruction = reconstruction;
     clearTimeout(this.#progressTimer);
     if (isBusy(reconstruction)) this.#progressTimer = setTimeout(() => void this.#ask(reconstruction.id), SILENCE);
+    if (this.#stale && (reconstruction.state === "failed" || reconstruction.state === "cancelled")) this.#dropResult();
     if (reconstruction.state === "done") void this.#attempt(() => this.#show(reconstruction));
+  }
+
+  /** The surface is that of curves which are not so any more. */
+  #dropResult(): void {
+    if (!this.result) return;
+    this.result = undefined;
+    this.#redraw();
   }
 
   /** The live path may drop what it has to say, so a job that is silent is asked. */
@@ -258,22 +237,41 @@ export class SessionStore {
     const result = await loadResult(this.api, reconstruction);
     if (this.#loading !== reconstruction.id) return;
     this.result = result;
+    this.#stale = false;
     this.preview = undefined;
     this.#redraw();
+    if (this.#pointed) this.needSamples();
   }
 
-  async #try(parameters: Partial<ReconstructionParameters>): Promise<void> {
-    await this.#command(async () => {
-      const { curves, nodes, report } = await this.api.preview(this.id, this.#client, parameters);
+  async #try(marks: Trial): Promise<void> {
+    try {
+      const wish = { ...this.parameters.request, marks: [...marks] };
+      const { curves, nodes, report } = await this.api.preview(this.id, this.#client, wish);
       const network = new Network();
       network.apply({ type: "live.network", curves, nodes });
       this.preview = { network, report: { network: report } };
-      this.#redraw();
-    });
+      this.problem = "";
+    } catch (error) {
+      if (error instanceof ApiProblem && error.status === OVERTAKEN) return;
+      this.problem = inWords(error);
+      this.preview = undefined;
+      if (this.#stale) this.result = undefined;
+    }
+    this.#redraw();
+  }
+
+  /** Curves or marks were changed: draw the network that they give, and let the surface follow if there was one. */
+  #edited(): void {
+    if (this.scanning) return;
+    this.#follows ||= this.result !== undefined || (this.reconstruction !== undefined && isBusy(this.reconstruction));
+    this.#stale = true;
+    this.tryOut();
+    if (this.#follows) void this.reconstruct();
   }
 
   /** Points were scanned that no result has: show what is live. */
   #outdate(): void {
+    this.#follows = false;
     if (!this.result && !this.preview) return;
     this.result = this.preview = undefined;
     this.#redraw();
@@ -287,6 +285,17 @@ export class SessionStore {
 
   async #listRecordings(): Promise<void> {
     await this.#attempt(async () => (this.recordings = await this.api.recordings(this.id)));
+  }
+
+  async #listDetails(): Promise<void> {
+    await this.#attempt(async () => (this.details = await this.api.curves(this.id)));
+  }
+
+  #detailsSoon(): void {
+    this.#detailsTimer ??= setTimeout(() => {
+      this.#detailsTimer = undefined;
+      void this.#listDetails();
+    }, LIST_PAUSE);
   }
 
   /** The list of curves changes with every message; a person reads it a few times a second. */
@@ -307,7 +316,7 @@ export class SessionStore {
   }
 
   /** What a person asked for: an older problem is not theirs any more. */
-  async #command(work: () => Promise<unknown>): Promise<void> {
+  async command(work: () => Promise<unknown>): Promise<void> {
     this.problem = "";
     await this.#attempt(work);
   }
@@ -324,12 +333,6 @@ export class SessionStore {
 /** Whether a reconstruction has not ended yet. */
 export function isBusy(reconstruction: Reconstruction): boolean {
   return reconstruction.state === "queued" || reconstruction.state === "running";
-}
-
-function nowIs(flag: CurveFlag, value: boolean): string {
-  if (flag === "boundary") return value ? "made boundary" : "made interior";
-  if (flag === "closed") return value ? "closed" : "opened";
-  return value ? "removed" : "brought back";
 }
 
 /** An error in words for the person in front of the screen. */

@@ -7,7 +7,7 @@ import numpy as np
 from tracemesh.errors import ScanError
 from tracemesh.formats.calibrations import corrections, with_right_wheel
 from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
-from tracemesh.geometry.scan import Floats
+from tracemesh.geometry.scan import Floats, Ints
 from tracemesh.geometry.sensing.odometry import COUNTER_RANGE, NOMINAL_SPEED
 from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
 from tracemesh.wire.base import Vector
@@ -36,18 +36,25 @@ class CurveDrawing:
         self._tangent: Floats | None = None
         self._reading: float | None = None
         self._solved = np.empty((0, 3))
+        self._solved_samples = np.empty(0, np.int64)
         self._solved_to = -1
         self._shift = np.zeros(3)
 
-    def extend(self, blocks: Sequence[Samples]) -> tuple[int, Floats]:
-        """Take new samples; number and positions (k, 3) of the points that they add."""
-        before = len(self._solved) + len(self._sample) - self._first_after_solved()
-        return before, np.concatenate([self._reckon(block) for block in blocks]) + self._shift
+    def extend(self, blocks: Sequence[Samples]) -> tuple[int, Floats, Ints]:
+        """Take new samples; number, positions (k, 3) and samples (k,) of the points that they add."""
+        before, known = len(self._solved) + len(self._sample) - self._first_after_solved(), len(self._sample)
+        added = np.concatenate([self._reckon(block) for block in blocks]) + self._shift
+        return before, added, self._sample[known:]
 
     @property
     def positions(self) -> Floats:
         """All points (n, 3) as drawn."""
         return np.concatenate([self._solved, self._path[self._first_after_solved() :] + self._shift])
+
+    @property
+    def samples(self) -> Ints:
+        """The sample (n,) that each point is at."""
+        return np.concatenate([self._solved_samples, self._sample[self._first_after_solved() :]])
 
     def position(self, sample: int) -> Floats:
         """Where a sample behind the solved beginning is drawn (3,)."""
@@ -58,9 +65,9 @@ class CurveDrawing:
         self._shift = position - self._reckoned(sample)
         self.attached = True
 
-    def settle(self, positions: Floats, last_sample: int) -> None:
-        """The curve up to `last_sample` was solved; the rest goes on from there."""
-        self._solved, self._solved_to = positions, last_sample
+    def settle(self, positions: Floats, samples: Ints, last_sample: int) -> None:
+        """The curve up to `last_sample` was solved: points (n, 3) at its samples (n,); the rest goes on from there."""
+        self._solved, self._solved_samples, self._solved_to = positions, samples, last_sample
         self.attach(last_sample, positions[-1])
 
     def _first_after_solved(self) -> int:

@@ -56,7 +56,7 @@ class SessionTracker:
         self._nodes.update(solved.nodes)
         for index, curve in solved.curves.items():
             if index in self._curves:
-                self._curves[index].settle(curve.positions, curve.last_sample)
+                self._curves[index].settle(curve.positions, curve.samples, curve.last_sample)
         return self.network()
 
     def network(self) -> LiveNetwork:
@@ -74,8 +74,9 @@ class SessionTracker:
     def _points(self, index: int, blocks: Sequence[Samples]) -> list[Change]:
         if index not in self._curves:  # removed meanwhile
             return []
-        first, positions = self._curves[index].extend(blocks)
-        return [LivePoints(index=index, first=first, positions=flat(positions))] if len(positions) else []
+        first, positions, samples = self._curves[index].extend(blocks)
+        points = LivePoints(index=index, first=first, positions=flat(positions), samples=samples.tolist())
+        return [points] if len(positions) else []
 
     def _event(self, accepted: Accepted) -> list[Change]:
         index, message = accepted.index, accepted.message
@@ -137,6 +138,7 @@ def _curve(index: int, drawing: CurveDrawing) -> LiveCurve:
         closed=drawing.closed,
         ended=drawing.ended,
         positions=flat(drawing.positions),
+        samples=drawing.samples.tolist(),
     )
 
 

@@ -14,7 +14,7 @@ from tracemesh.storage.artifacts import MEDIA_TYPES, artifact_row
 from tracemesh.storage.models import derived_id
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.live import Preview
-from tracemesh.wire.resources import Reconstruction, ReconstructionParameters
+from tracemesh.wire.resources import PreviewWish, Reconstruction, ReconstructionParameters
 
 router = APIRouter(tags=["reconstructions"])
 
@@ -64,11 +64,11 @@ def _queued(services: Services, response: Response, made: Reconstruction) -> Rec
 async def preview(
     session: Identifier,
     services: UseServices,
-    parameters: ReconstructionParameters | None = None,
+    wanted: PreviewWish | None = None,
     client: Annotated[str, Query(max_length=64, description="only its newest wish is answered")] = "",
 ) -> Preview:
-    """The network with these parameters, at once; 409 when the same client asked for another one meanwhile."""
-    return await services.previewer.solve(session, client, parameters or ReconstructionParameters())
+    """The network with these parameters and marks, at once; 409 when the same client asked again meanwhile."""
+    return await services.previewer.solve(session, client, wanted or PreviewWish())
 
 
 @router.get("/sessions/{session}/reconstructions")

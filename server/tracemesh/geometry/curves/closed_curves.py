@@ -4,13 +4,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracemesh.geometry.scan import CurveScan
+from tracemesh.geometry.scan import CurveScan, Ints, Scan
 
 
 def sample_as_scanned(sample: int, first_mark: int, count: int) -> int:
     """Where a sample of a closed curve of `count` was before `from_first_node` made it begin at `first_mark`."""
     after = first_mark + sample
     return after if after < count else after - count + 1
+
+
+def as_scanned(curve: CurveScan, samples: Ints) -> Ints:
+    """Samples (n,) of a curve's `from_first_node` as the curve itself counts them."""
+    if not curve.closed or from_first_node(curve) is curve:
+        return samples
+    count = len(curve.distance)
+    after = samples + curve.node_samples[0]
+    scanned: Ints = np.where(after < count, after, after - count + 1)
+    return scanned
+
+
+def begun_at_nodes(scan: Scan) -> Scan:
+    """The scan with every closed curve going from its first node to the same node."""
+    return Scan(tuple(from_first_node(curve) if curve.closed else curve for curve in scan.curves))
 
 
 def from_first_node(curve: CurveScan) -> CurveScan:
