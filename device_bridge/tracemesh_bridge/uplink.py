@@ -87,6 +87,7 @@ class Uplink:
         self.session = ""
         self.refusal: Refused | None = None
         """Why the server does not want this recording, while it does not."""
+        self._proposed: str | None = None
 
     def wake(self) -> None:
         """There is something new to send."""
@@ -162,6 +163,11 @@ class Uplink:
         self.session = welcome.session
         self._resume(welcome.next_seq)
         self.refusal = None
+        if welcome.calibration and welcome.calibration != self._proposed:
+            self._proposed = welcome.calibration
+            self._link.note(
+                f"{welcome.calibration} is available; it is used only if you choose it on the session's page"
+            )
 
     def _resume(self, next_seq: int) -> None:
         if next_seq < self._log.first_seq:

@@ -186,6 +186,11 @@ class Process:
         self._process.stdin.flush()
         return len(keys)
 
+    def hang_up(self) -> None:
+        """No more keys come."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
     def stop(self, number: int) -> int:
         """Send a signal and wait for the end."""
         if self._process.poll() is None:

@@ -8,9 +8,12 @@ import subprocess
 import sys
 import urllib.request
 
+import numpy as np
 import pytest
 
-from tracemesh.wire.device import CurveEnd, Samples, from_device
+from tracemesh.formats.calibrations import corrections
+from tracemesh.wire.calibration import Calibration
+from tracemesh.wire.device import CurveEnd, Device, Samples, from_device
 from tracemesh_bridge.framing import Frame, FrameLayout, encode
 
 
@@ -89,3 +92,56 @@ def test_server_and_bridge_killed_in_mid_curve(bench, real_server):
     end = from_device.validate_json(stored[-1])
     assert isinstance(end, CurveEnd)
     assert end.closed
+
+
+SENSORS = {"coverage": 1, "spread_before": 0, "spread_after": 0}
+TRUE = {
+    "device": "morphorider",
+    "made": "2026-05-03T10:00:00Z",
+    "circumference": 0.097,
+    "accelerometer": {"matrix": [[0.98, 0.01, 0], [0.01, 1.02, 0], [0, 0, 1]], "offset": [0.01, -0.015, 0.005]}
+    | SENSORS,
+    "magnetometer": {"matrix": [[0.87, -0.05, 0], [-0.05, 1.1, 0.03], [0, 0.03, 1.05]], "offset": [0.12, -0.08, 0.05]}
+    | SENSORS,
+    "alignment": [0.99964, 0.02, -0.015, 0.01],
+}
+
+
+def directions(calibration):
+    """What a calibrated device measures in three poses, each vector of length 1."""
+    device = Device(id="morphorider", kind="k", calibration=Calibration.model_validate(calibration))
+    right = corrections(device)["magnetic"](0.3 * np.eye(3))
+    return right / np.linalg.norm(right, axis=1, keepdims=True)
+
+
+def test_a_virtual_device_that_errs_is_calibrated_and_recorded_with_its_calibration(bench, real_server, eventually):
+    true, found = bench.folder / "true.json", bench.folder / "found.json"
+    true.write_text(json.dumps(TRUE))
+    port = ("--port", str(bench.folder / "rider"), "--rate", "500", "--timeout", "2")
+    device = bench.virtual("--calibrating", "--distortion", str(true), "--noise", "0.5")
+    command = bench.start(
+        "calibrate", *port, "--place", "the lab", "--output", str(found), "--server", real_server.address
+    )
+    for step in range(1, 5):
+        eventually(lambda step=step: device.keys.count(b"\n") >= step)
+        command.type("\n")
+    assert command.wait() == 0, command.said
+    calibration = json.loads(found.read_text())
+    assert calibration["circumference"] == pytest.approx(0.097, rel=0.002)
+    np.testing.assert_allclose(calibration["magnetometer"]["offset"], TRUE["magnetometer"]["offset"], atol=0.002)
+    np.testing.assert_allclose(calibration["accelerometer"]["matrix"], TRUE["accelerometer"]["matrix"], atol=0.02)
+    np.testing.assert_allclose(directions(calibration), directions(TRUE), atol=0.02)
+    assert calibration["accelerometer"]["spread_before"] > 2 * calibration["accelerometer"]["spread_after"]
+    assert json.loads(real_server.get("/devices/morphorider/calibrations")) == [{**calibration, "version": 1}]
+
+    device.wait()
+    bench.virtual()
+    plain = bench.bridge()
+    plain.says("calibration 1 of morphorider")
+    plain.stop(signal.SIGINT)
+    chosen = bench.bridge("--calibration", str(found))
+    chosen.says("server: live")
+    assert "is available" not in chosen.said
+    (session,) = (s["id"] for s in json.loads(real_server.get("/sessions"))[:1])
+    (recording,) = json.loads(real_server.get(f"/sessions/{session}/recordings"))
+    assert recording["calibration"] == 1

@@ -10,7 +10,9 @@ from platformdirs import user_data_path
 from pydantic import TypeAdapter, ValidationError
 
 from tracemesh.wire.base import Identifier, Name, UnitQuaternion
+from tracemesh.wire.calibration import Calibration
 from tracemesh.wire.device import Device, Wheel
+from tracemesh_bridge.errors import BridgeError
 from tracemesh_bridge.framing import FrameLayout, read_layout
 from tracemesh_bridge.keys import KEYS_HELP
 from tracemesh_bridge.record import TOKEN_VARIABLE, Target
@@ -68,6 +70,15 @@ def target(args: argparse.Namespace) -> Target:
 def device(args: argparse.Namespace, kind: str, wheel: Wheel | None = None) -> Device:
     """The device that a recording command describes."""
     return Device(id=args.device, kind=kind, name=args.name, mounting=args.mounting, wheel=wheel)
+
+
+def calibrated(device: Device, calibration: Calibration) -> Device:
+    """The device with its calibration. Raises BridgeError if it is another one's."""
+    if calibration.device != device.id:
+        raise BridgeError(
+            f"wanted a calibration of the device {device.id}, got one of {calibration.device}; see --device"
+        )
+    return device.model_copy(update={"calibration": calibration})
 
 
 def layout(args: argparse.Namespace) -> FrameLayout:

@@ -30,6 +30,8 @@ def add(commands: Commands) -> None:
         help="the ride goes on by itself, or by one reading per request (default: %(default)s)",
     )  # fmt: skip
     option("--log", type=Path, help="append each whole frame sent to this file, in hex")
+    option("--calibrating", action="store_true", help="be led through a calibration instead of over a shape")
+    option("--distortion", type=Path, metavar="CAL.json", help="err as this calibration would correct")
     option("--unplug", type=count, metavar="N", help="vanish after N requests, come back under another name")
     for fault in FAULTS:
         option(f"--{fault}", type=probability, default=0.0, metavar="P", help="probability of this fault")
@@ -57,9 +59,9 @@ def _add_ride(command: argparse.ArgumentParser) -> None:
 
 def _virtual(args: argparse.Namespace) -> int:
     faults = tuple((name, getattr(args, name)) for name in FAULTS)
-    settings = VirtualSettings(
-        args.shape, args.speed, args.pace, args.seed, args.noise, args.link, faults, args.unplug, args.log
-    )
+    ride = (args.shape, args.speed, args.pace, args.seed, args.noise)
+    more = (args.unplug, args.log, args.calibrating, args.distortion)
+    settings = VirtualSettings(*ride, args.link, faults, *more)
     run_virtual(settings)
     return 0
 

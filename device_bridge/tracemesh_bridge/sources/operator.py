@@ -6,7 +6,7 @@ Apart from the devices because the simulation brings half of scipy with it, whic
 import os
 import sys
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from tracemesh.geometry.simulated.shapes import SHAPES
 from tracemesh.geometry.simulated.simulation import Handling, Imperfections, ScanPlan, plan_scan
@@ -22,11 +22,11 @@ def ride_plan(shape: str, noise: float, seed: int) -> ScanPlan:
 
 
 class Operator:
-    """Types on stdout what the plan says, when it says."""
+    """Types on stdout what is due, when it is due."""
 
-    def __init__(self, plan: ScanPlan) -> None:
-        """Nothing typed yet."""
-        self._keys = deque(operator_keys(plan))
+    def __init__(self, keys: Iterable[tuple[float, str]]) -> None:
+        """`keys`: what to type, a line each, and when (s since the ride began), in order."""
+        self._keys = deque(keys)
         self._is_heard = True
 
     @property

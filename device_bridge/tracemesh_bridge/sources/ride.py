@@ -5,9 +5,11 @@ import time
 
 import numpy as np
 
-from tracemesh.geometry.simulated.simulation import COUNTS
+from tracemesh.geometry.simulated.calibration_ride import CalibrationPlan
+from tracemesh.geometry.simulated.simulation import COUNTS, Imperfections, ScanPlan
+from tracemesh_bridge.distortion import Distortion, read_file
 from tracemesh_bridge.framing import Frame, FrameLayout, encode
-from tracemesh_bridge.sources.operator import Operator, ride_plan
+from tracemesh_bridge.sources.operator import Operator, operator_keys, ride_plan
 from tracemesh_bridge.sources.virtual import LATE_BY, VirtualSettings
 
 
@@ -16,12 +18,13 @@ class Ride:
 
     def __init__(self, settings: VirtualSettings) -> None:
         """The ride begins with the first request. Raises BridgeError if there is no such shape."""
-        self._plan = ride_plan(settings.shape, settings.noise, settings.seed)
+        self._plan, keys = _plan(settings)
+        self._wrong = Distortion(read_file(settings.distortion)) if settings.distortion else None
         self._settings = settings
         self._generator = np.random.default_rng(settings.seed)
         self._chance = random.Random(settings.seed)
         self._layout = FrameLayout()
-        self._operator = Operator(self._plan)
+        self._operator = Operator(keys)
         self._began: float | None = None
         self.requests = 0
 
@@ -60,7 +63,8 @@ class Ride:
         raw = self._plan.readings(np.array([self.time]), self._generator)
         turns, small = (int(t) for t in raw.ticks[0])
         acceleration, magnetic = (_vector(v[0]) for v in (raw.acceleration, raw.magnetic))
-        return self._spoil(encode(self._layout, Frame((turns, small), acceleration, magnetic)))
+        frame = Frame((turns, small), acceleration, magnetic)
+        return self._spoil(encode(self._layout, self._wrong(frame) if self._wrong else frame))
 
     def _spoil(self, frame: bytes) -> bytes:
         fault = self._next_fault()
@@ -86,6 +90,15 @@ class Ride:
                 return name
             dice -= probability
         return ""
+
+
+def _plan(settings: VirtualSettings) -> tuple[ScanPlan | CalibrationPlan, list[tuple[float, str]]]:
+    """How the device is moved, and the keys of its operator."""
+    if settings.calibrating:
+        calibrated = CalibrationPlan(Imperfections().scaled(settings.noise))
+        return calibrated, [(time, "") for time in calibrated.enters]
+    plan = ride_plan(settings.shape, settings.noise, settings.seed)
+    return plan, list(operator_keys(plan))
 
 
 def _vector(counts: np.ndarray[tuple[int], np.dtype[np.int64]]) -> tuple[float, float, float]:

@@ -30,6 +30,8 @@ class VirtualSettings:
     reading per request, so that what is sent does not depend on how fast the computer is. link: symbolic link to the
     port, for a name known beforehand. faults: probability of each per request. unplug: number of the request after
     which the port vanishes, to come back under another name. log: file that receives every whole frame sent, in hex.
+    calibrating: it is led through a calibration instead of over the shape. distortion: file with the calibration that
+    would correct its sensors and its wheel.
     """
 
     shape: str = "leaf"
@@ -41,6 +43,8 @@ class VirtualSettings:
     faults: tuple[tuple[str, float], ...] = ()
     unplug: int | None = None
     log: Path | None = None
+    calibrating: bool = False
+    distortion: Path | None = None
 
 
 def run_virtual(settings: VirtualSettings) -> None:
@@ -50,7 +54,8 @@ def run_virtual(settings: VirtualSettings) -> None:
     ride = Ride(settings)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # not without removing the link: its port is soon another's
     with _Port(settings.link) as port:
-        say(f"virtual Morphorider ({settings.shape}, {ride.duration:.0f} s) at {port.name}")
+        what = "calibration" if settings.calibrating else settings.shape
+        say(f"virtual Morphorider ({what}, {ride.duration:.0f} s) at {port.name}")
         while not ride.over:
             if port.request(ride.patience):
                 port.write(ride.answer())

@@ -25,7 +25,7 @@ from websockets.sync.server import ServerConnection, serve
 from tracemesh.geometry.simulated.simulation import ScanPlan
 from tracemesh_bridge.phone import MOUNTING
 from tracemesh_bridge.pose import GRAVITY
-from tracemesh_bridge.sources.operator import Operator, ride_plan
+from tracemesh_bridge.sources.operator import Operator, operator_keys, ride_plan
 from tracemesh_bridge.sources.virtual import say
 
 Floats = NDArray[np.float64]
@@ -126,7 +126,7 @@ def run_virtual_phone(settings: VirtualPhoneSettings) -> None:
 
 
 def _ride(phone: Phone, plan: ScanPlan, each: Callable[[], object]) -> None:
-    operator = Operator(plan)
+    operator = Operator(operator_keys(plan))
     while not operator.over:
         each()
         time.sleep(0.01)

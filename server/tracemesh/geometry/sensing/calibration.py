@@ -26,7 +26,7 @@ class CalibrationFit:
     """Both sensors of a device, and how they are turned.
 
     alignment: (3, 3) turns the magnetometer's corrected vectors into the accelerometer's axes. dip: rad, of the field
-    below the horizontal. dip_spread_before, dip_spread_after: rad, standard deviations over all poses.
+    below the horizontal. dip_spread_before, dip_spread_after: rad, robust standard deviations over all poses.
     """
 
     accelerometer: SensorFit
@@ -59,8 +59,12 @@ def fit_calibration(acceleration: Floats, magnetic: Floats, faces: Floats | None
             up.coverage, up.spread_before, up.spread_after, up.used,
         )  # fmt: skip
         turn = case @ turn
-    dip = float(np.mean(after)) - np.pi / 2
-    return CalibrationFit(up, field, turn, dip, float(np.std(before)), float(np.std(after)))
+    dip = float(np.median(after)) - np.pi / 2
+    return CalibrationFit(up, field, turn, dip, _robust_deviation(before), _robust_deviation(after))
+
+
+def _robust_deviation(values: Floats) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
 def wheel_circumference(ticks: Ints, length: float, ticks_per_turn: int) -> float:

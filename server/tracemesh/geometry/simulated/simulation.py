@@ -104,14 +104,11 @@ class ScanPlan:
     def readings(self, time: Floats, generator: np.random.Generator) -> Readings:
         """What the device answers at times (n,); after the end it stays where it is."""
         curve, travelled, position = self._state(time)
-        ticks = np.floor(travelled * (TICKS_PER_TURN / WHEEL_CIRCUMFERENCE) + 1e-6).astype(np.int64)
-        turns, small = np.divmod(ticks, TICKS_PER_TURN)
         vectors = np.empty((2, len(time), 3))
         for index in np.unique(curve):
             on = curve == index
             vectors[:, on] = _vectors(self.curves[index].at(position[on])[1], float(self.heading[index]))
-        acceleration, magnetic = _counts(_disturbed(vectors, self.imperfections, generator))
-        return Readings(np.column_stack([_wrapped(turns), small]), acceleration, magnetic)
+        return raw_readings(travelled, vectors, self.imperfections, generator)
 
     def _state(self, time: Floats) -> tuple[Ints, Floats, Floats]:
         """Curve, wheel's way and position along the curve at times (n,)."""
@@ -131,6 +128,16 @@ class SimulatedCurve:
     node_ids: Ints
     boundary: bool
     closed: bool
+
+
+def raw_readings(
+    travelled: Floats, vectors: Floats, imperfections: Imperfections, generator: np.random.Generator
+) -> Readings:
+    """What the device answers whose wheel has gone (n,) m and whose sensors see vectors (2, n, 3), device axes."""
+    ticks = np.floor(travelled * (TICKS_PER_TURN / WHEEL_CIRCUMFERENCE) + 1e-6).astype(np.int64)
+    turns, small = np.divmod(ticks, TICKS_PER_TURN)
+    acceleration, magnetic = _counts(_disturbed(vectors, imperfections, generator))
+    return Readings(np.column_stack([_wrapped(turns), small]), acceleration, magnetic)
 
 
 def plan_scan(
