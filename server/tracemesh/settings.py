@@ -47,6 +47,7 @@ class Settings(BaseSettings):
     job_slots: int = Field(default=1, ge=1, le=64, description="reconstructions at once, each in a process of its own")
     job_timeout: int = Field(default=3600, ge=1, description="most seconds of one reconstruction")
     job_memory: int = Field(default=2**32, ge=2**29, description="most bytes of an embedded job's process")
+    preview_memory: int = Field(default=2**28, ge=0, description="most bytes of networks kept ready for previews")
     max_devices: int = Field(default=1000, ge=1, description="devices connected at once")
     max_device_rate: int = Field(
         default=1000, ge=1, description="messages a second that are read from one device, every 4 kB counting as one"

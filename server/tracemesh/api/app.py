@@ -102,7 +102,7 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     hub = Hub(database, settings.resolved_database_url, recorder.flush)
     metrics.watch("devices", "Devices connected", lambda: recorder.open_count)
     metrics.watch("watchers", "Browsers that watch a session", lambda: hub.watcher_count)
-    previewer, comparer = Previewer(database, recorder.flush), Comparer()
+    previewer, comparer = Previewer(database, recorder.flush, settings.preview_memory), Comparer()
     runner = JobRunner(settings, database, tell)
     store = open_artifacts(settings)
     tidying = asyncio.create_task(_collect_garbage(database, store))

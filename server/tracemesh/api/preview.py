@@ -4,6 +4,7 @@ import asyncio
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from typing import TypeVar
 
 from tracemesh.api.live.drawing import flat
@@ -12,11 +13,12 @@ from tracemesh.formats.rawnet import write_rawnet
 from tracemesh.formats.recordings import with_marks
 from tracemesh.geometry.curves.closed_curves import begun_at_nodes
 from tracemesh.geometry.scan import Floats, Scan
-from tracemesh.jobs.attached import SolvedNetwork, solve_network
+from tracemesh.jobs.attached import SolvedNetwork
 from tracemesh.jobs.proposals import propose_nodes
 from tracemesh.jobs.slot import Slot
 from tracemesh.storage.curves import list_curves
 from tracemesh.storage.database import Database
+from tracemesh.storage.models import new_id
 from tracemesh.storage.scans import load_sent
 from tracemesh.wire.live import LiveCurve, Preview
 from tracemesh.wire.resources import Curve, CurveMarks, NodePosition, NodeProposals, PreviewWish
@@ -24,14 +26,24 @@ from tracemesh.wire.resources import Curve, CurveMarks, NodePosition, NodePropos
 MAX_SCANS = 8
 """Sessions whose scan is kept in memory."""
 T = TypeVar("T")
-Loaded = tuple[Scan, list[int], list[Curve]]
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What a session amounted to when it was read; `name` tells it from what the session was before or is later."""
+
+    name: str
+    scan: Scan
+    indices: list[int]
+    curves: list[Curve]
 
 
 class Previewer:
-    """Keeps the scans of the sessions last asked for, and one process that solves them. On one event loop."""
+    """Keeps the scans of the sessions last asked for, and one process that keeps them ready. On one event loop."""
 
-    def __init__(self, database: Database, flush: Callable[[], Awaitable[None]]) -> None:
-        """`flush` waits until everything accepted is committed."""
+    def __init__(self, database: Database, flush: Callable[[], Awaitable[None]], budget: int) -> None:
+        """`flush` waits until everything accepted is committed; budget: bytes of what the process keeps ready."""
+        self._budget = budget
         self._database = database
         self._flush = flush
         self._slot = Slot()
@@ -54,27 +66,29 @@ class Previewer:
         """
         wish = self._newest[session, client] = object()
         try:
-            scan, indices, curves = await self._scan(session)
-            scan = _marked(scan, indices, wanted.marks)
+            loaded = await self._scan(session)
+            scan = _marked(loaded.scan, loaded.indices, wanted.marks)
+            name = f"{loaded.name} {wanted.marks}"
             async with self._turn:
                 if self._newest.get((session, client)) is not wish:
                     raise Conflict("the same client asked for another preview meanwhile")
-                return _preview(await self._run(solve_network, scan, indices, wanted), curves)
+                solved = await self._run(_solve, name, scan, loaded.indices, wanted, self._budget)
+                return _preview(solved, loaded.curves)
         finally:
             if self._newest.get((session, client)) is wish:
                 del self._newest[session, client]
 
     async def propose(self, session: str) -> NodeProposals:
         """Nodes that were found in a session; raises NotFound and ScanError."""
-        scan, indices, curves = await self._scan(session)
-        by_index = {curve.index: curve for curve in curves}
+        loaded = await self._scan(session)
+        by_index = {curve.index: curve for curve in loaded.curves}
         async with self._turn:
-            return await self._run(propose_nodes, begun_at_nodes(scan), [by_index[i] for i in indices])
+            return await self._run(propose_nodes, begun_at_nodes(loaded.scan), [by_index[i] for i in loaded.indices])
 
     async def rawnet(self, session: str) -> str:
         """The session's scan as a rawnet; raises NotFound and ScanError."""
-        scan, _, _ = await self._scan(session)
-        return await asyncio.to_thread(write_rawnet, begun_at_nodes(scan))
+        loaded = await self._scan(session)
+        return await asyncio.to_thread(write_rawnet, begun_at_nodes(loaded.scan))
 
     async def _run(self, function: Callable[..., T], *arguments: object) -> T:
         try:
@@ -101,7 +115,7 @@ class Previewer:
 
         def read() -> Loaded:
             with self._database.read() as transaction:
-                return *load_sent(transaction, session), list_curves(transaction, session)
+                return Loaded(new_id(), *load_sent(transaction, session), list_curves(transaction, session))
 
         return await asyncio.to_thread(read)
 
@@ -118,6 +132,12 @@ def _marked(scan: Scan, indices: Sequence[int], wanted: Sequence[CurveMarks]) ->
             raise InputError(f"curve {change.curve} has {count} samples, got a mark at sample {beyond[0]}")
         curves[place] = with_marks(curves[place], [(mark.sample, mark.node) for mark in change.marks])
     return Scan(tuple(curves))
+
+
+def _solve(name: str, scan: Scan, indices: Sequence[int], wanted: PreviewWish, budget: int) -> SolvedNetwork:
+    from tracemesh.jobs.warm import solve_warm  # in the process that solves: the server itself stays small
+
+    return solve_warm(name, scan, indices, wanted, budget)
 
 
 def _preview(solved: SolvedNetwork, curves: Sequence[Curve]) -> Preview:

@@ -5,6 +5,7 @@ The solver is imported where it runs: the server itself stays small and starts a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 from tracemesh.storage.curves import curve_rows
 from tracemesh.storage.database import Database
 from tracemesh.storage.scans import load_sent
-from tracemesh.wire.resources import ReconstructionParameters
+
+if TYPE_CHECKING:
+    from tracemesh.geometry.curves.reconstruction import NetworkResult
 
 
 @dataclass(frozen=True)
@@ -67,15 +70,19 @@ def largest_piece(curves: Sequence[CurveScan], candidates: Sequence[int]) -> lis
     return max(members, key=lambda piece: (sum(len(curves[i].distance) for i in piece), -piece[0]), default=[])
 
 
-def solve_network(
-    scan: Scan, indices: Sequence[int], parameters: ReconstructionParameters | None = None
-) -> SolvedNetwork:
+def solve_network(scan: Scan, indices: Sequence[int]) -> SolvedNetwork:
     """The network of a scan, as it was sent, whose curves have these indices in the session; raises ScanError."""
     from tracemesh.geometry.curves.reconstruction import reconstruct_network
-    from tracemesh.pipeline import network_parameters
 
     begun = begun_at_nodes(scan)
-    result = reconstruct_network(begun, network_parameters(parameters or ReconstructionParameters()))
+    return solved_network(scan, begun, indices, reconstruct_network(begun))
+
+
+def solved_network(scan: Scan, begun: Scan, indices: Sequence[int], result: "NetworkResult") -> SolvedNetwork:
+    """A network by the indices of its curves in the session, and the numbers of its nodes.
+
+    The scan as it was sent, and as it was solved, with closed curves begun at their nodes.
+    """
     network = result.network
     numbers = np.unique(np.concatenate([curve.node_ids for curve in scan.curves]))
     curves = {

@@ -130,7 +130,7 @@ class NetworkReconstruction:
     def solve(self, weights: Weights | None = None) -> NetworkResult:
         """The network, smoothed with the chosen weights or with others; the latter starts from the solution before."""
         layout = self._samples.layout
-        used = weights or _weights(self._parameters, self._choice.weights)
+        used = weights or wanted_weights(self._parameters) or self._choice.weights
         self._stages.begin("smoothing")
         regression = self._solver.solve(self._samples.frames, used, self._start, self._parameters.robust)
         self._stages.begin("positions")
@@ -237,11 +237,12 @@ def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> N
             )
 
 
-def _weights(parameters: NetworkParameters, automatic: Weights) -> Weights:
+def wanted_weights(parameters: NetworkParameters) -> Weights | None:
+    """The weights that somebody chose; None: automatic ones."""
     if parameters.weights == "thesis":
         return Weights(1.0, 1.0)
     if parameters.stretch is None and parameters.bend is None:
-        return automatic
+        return None
     return Weights(parameters.stretch or 0.0, parameters.bend or 0.0)
 
 
