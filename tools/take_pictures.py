@@ -1,6 +1,6 @@
-"""Take the README's pictures: run the demo, watch it in Chromium, keep three moments.
+"""Take the pictures of the pages that README and docs show, in Chromium, through a real server.
 
-.venv/bin/python tools/take_pictures.py
+.venv/bin/python tools/take_pictures.py [demo] [page]     all when none is named
 """
 
 import json
@@ -8,40 +8,59 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+from tracemesh.formats.meshes import write_triangles
+from tracemesh.geometry.simulated.shapes import leaf
 
 PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 FLAGS = [
     *("--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),
     *("--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader"),
 ]
+DESK, PHONE = {"width": 1280, "height": 760}, {"width": 390, "height": 844}
+LOOKS = ("Shaded", "Isophotes", "Reflection lines", "Normal map", "Mean curvature", "Gaussian curvature")
+PATIENCE = 60_000
+"""ms until something that should be seen counts as missing."""
 
 
-def main() -> None:
-    """One demo from beginning to end."""
-    demo = subprocess.Popen(
-        [sys.executable, "-m", "tracemesh", "demo", "--port", "0"], stdout=subprocess.PIPE, text=True
-    )
+def main(chosen: list[str]) -> None:
+    """The README's three moments of a demo; then the page in every state, from what the demo left."""
+    with sync_playwright() as playwright, demo() as address:
+        expect.set_options(timeout=PATIENCE)
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        watch(browser, address, keep="demo" in chosen or not chosen)
+        if "page" in chosen or not chosen:
+            show_page(browser, address)
+            show_theme_and_phone(browser, address)
+        browser.close()
+
+
+@contextmanager
+def demo() -> Iterator[str]:
+    """A demo that runs; the address of its session's page."""
+    command = [sys.executable, "-m", "tracemesh", "demo", "--port", "0"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
-        assert demo.stdout is not None
-        address = demo.stdout.readline().split()[-1]
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
-            page = browser.new_page(viewport={"width": 1120, "height": 700})
-            page.goto(address)
-            watch(page, address.replace("/#/", "/api/v1/"))
-            browser.close()
+        assert process.stdout is not None
+        yield process.stdout.readline().split()[-1]
     finally:
-        demo.send_signal(signal.SIGINT)
-        demo.wait(30)
+        process.send_signal(signal.SIGINT)
+        process.wait(30)
 
 
-def watch(page: Page, session: str) -> None:
+def watch(browser: Browser, address: str, keep: bool) -> None:
     """The second of five curves, the whole network, the surface."""
+    page = browser.new_page(viewport={"width": 1120, "height": 700})
+    page.goto(address)
+    session = api(address)
     for name, reached in (
         ("1-curves", lambda s: s["nodes"] >= 9),
         ("2-network", lambda s: s["nodes"] >= 11 and curves_ended(session) == 5),
@@ -50,12 +69,81 @@ def watch(page: Page, session: str) -> None:
         while not reached(get(session)):
             page.wait_for_timeout(100)
         page.wait_for_timeout(1500 if name == "3-surface" else 400)
-        page.screenshot(path=PICTURES / f"{name}.png")
+        if keep:
+            page.screenshot(path=PICTURES / f"{name}.png")
+    page.close()
+
+
+def show_page(browser: Browser, address: str) -> None:
+    """Every look and state of the desk page."""
+    page = browser.new_page(viewport=DESK, color_scheme="light", reduced_motion="reduce")
+    page.goto(address)
+    expect(page.locator("canvas")).to_have_attribute("data-surface", "shown")
+    for look in LOOKS:
+        page.get_by_label(look).check()
+        keep(page, f"look-{look.lower().replace(' ', '-')}")
+    compared(page)
+    page.get_by_label("Shaded").check()
+    for name, keys in (("uncertainty", "sw"), ("curvature-plot", "swpkb"), ("normals", "pkbv"), ("help", "v?")):
+        for key in keys:
+            page.keyboard.press(key)
+        keep(page, name)
+    page.keyboard.press("Escape")
+    editing(page)
+    page.get_by_role("link", name="tracemesh").click()
+    keep(page, "sessions")
+    page.get_by_label("Name of the new session").fill("Lamp")
+    page.get_by_role("button", name="New session").click()
+    expect(page.get_by_text("Nothing scanned yet.")).to_be_visible()
+    keep(page, "empty-session")
+    page.close()
+
+
+def compared(page: Page) -> None:
+    """The surface in the colours of its distance to the true leaf."""
+    with tempfile.NamedTemporaryFile(suffix=".obj") as truth:
+        Path(truth.name).write_bytes(write_triangles(*leaf().mesh(), "obj"))
+        page.get_by_label("Compare with a true mesh").set_input_files(truth.name)
+        expect(page.get_by_text("Distance to truth (mm)")).to_be_visible()
+    keep(page, "look-distance-to-truth")
+
+
+def editing(page: Page) -> None:
+    """A curve is chosen, its actions are offered; the parameters are open."""
+    page.get_by_role("button", name="3 interior").click()
+    page.get_by_text("Parameters").click()
+    keep(page, "editing")
+
+
+def show_theme_and_phone(browser: Browser, address: str) -> None:
+    """The dark theme, and the scanning page on a phone."""
+    dark = browser.new_page(viewport=DESK, color_scheme="dark", reduced_motion="reduce")
+    dark.goto(address)
+    expect(dark.locator("canvas")).to_have_attribute("data-surface", "shown")
+    keep(dark, "dark")
+    dark.close()
+    phone = browser.new_page(viewport=PHONE, device_scale_factor=2, reduced_motion="reduce")
+    phone.goto(address.replace("/#/sessions/", "/scan.html#"))
+    keep(phone, "scan-start")
+    phone.close()
+
+
+def keep(page: Page, name: str) -> None:
+    """One picture, once everything has settled."""
+    page.wait_for_timeout(800)
+    folder = PICTURES / "page"
+    folder.mkdir(exist_ok=True)
+    page.screenshot(path=folder / f"{name}.jpg", type="jpeg", quality=85)
 
 
 def curves_ended(session: str) -> int:
     """How many curves are scanned to their end."""
     return sum(curve["ended"] for curve in get(f"{session}/curves"))
+
+
+def api(address: str) -> str:
+    """The session of a page over REST."""
+    return address.replace("/#/", "/api/v1/")
 
 
 def get(url: str) -> Any:
@@ -65,4 +153,4 @@ def get(url: str) -> Any:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -1,3 +1,4 @@
+import { cross, difference, dot, scaled, vectorAt } from "./algebra";
 import { distance } from "./vectors";
 
 /** Length along a polyline at each of its points, m. */
@@ -35,34 +36,11 @@ export function norms(vectors: ArrayLike<number>): Float64Array {
 
 /** Write to out[i] the curvature vector at point i of the circle through points h, i, j. */
 function circle(p: ArrayLike<number>, h: number, i: number, j: number, out: Float64Array): void {
-  const a = edge(p, i, h);
-  const b = edge(p, i, j);
+  const a = difference(vectorAt(p, h), vectorAt(p, i));
+  const b = difference(vectorAt(p, j), vectorAt(p, i));
   const n = cross(a, b);
-  const product = dot(a, a) * dot(b, b) * dot(sub(a, b), sub(a, b));
+  const product = dot(a, a) * dot(b, b) * dot(difference(a, b), difference(a, b));
   if (product === 0) return;
-  const towards = cross(sub(scale(b, dot(a, a)), scale(a, dot(b, b))), n);
-  out.set(scale(towards, 2 / product), 3 * i);
-}
-
-type Triple = [number, number, number];
-
-function edge(p: ArrayLike<number>, from: number, to: number): Triple {
-  const at = (i: number): number => p[i] as number;
-  return [at(3 * to) - at(3 * from), at(3 * to + 1) - at(3 * from + 1), at(3 * to + 2) - at(3 * from + 2)];
-}
-
-function sub(a: Triple, b: Triple): Triple {
-  return [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-}
-
-function scale(a: Triple, s: number): Triple {
-  return [s * a[0], s * a[1], s * a[2]];
-}
-
-function dot(a: Triple, b: Triple): number {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-function cross(a: Triple, b: Triple): Triple {
-  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const towards = cross(difference(scaled(b, dot(a, a)), scaled(a, dot(b, b))), n);
+  out.set(scaled(towards, 2 / product), 3 * i);
 }

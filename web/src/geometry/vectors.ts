@@ -22,6 +22,12 @@ export function boundingBox(lists: Iterable<ArrayLike<number>>): Box | undefined
   return min[0] <= max[0] ? { min, max } : undefined;
 }
 
+/** Diagonal of the smallest box around all points, m; 1 when there are none. */
+export function diagonal(lists: Iterable<ArrayLike<number>>): number {
+  const box = boundingBox(lists);
+  return box ? distance(box.min, 0, box.max, 0) : 1;
+}
+
 /** Length of a polyline, m. */
 export function polylineLength(positions: ArrayLike<number>): number {
   let length = 0;

@@ -1,4 +1,7 @@
 import type {
+  Comparison,
+  ComparisonFailure,
+  ComparisonProgress,
   Curve,
   CurveUpdate,
   NodeProposals,
@@ -11,6 +14,7 @@ import type {
   RecordingSummary,
   Session,
 } from "../wire.gen";
+import { jsonLines } from "./lines";
 
 /** An answer of the server that is not a success, in its own words. */
 export class ApiProblem extends Error {
@@ -99,6 +103,19 @@ export class Api {
 
   reconstruction(id: string): Promise<Reconstruction> {
     return this.#json<Reconstruction>("GET", `/reconstructions/${id}`);
+  }
+
+  /** How far a reconstructed surface is from the true mesh in a file: progress, again and again, then the end. */
+  async *compare(
+    reconstruction: string,
+    truth: File,
+    align: string,
+    signal: AbortSignal,
+  ): AsyncGenerator<ComparisonProgress | Comparison | ComparisonFailure> {
+    const query = new URLSearchParams({ truth: truth.name, align });
+    const url = `${this.base}/reconstructions/${reconstruction}/comparison?${query}`;
+    const headers = { "content-type": "application/octet-stream" };
+    yield* jsonLines(await this.#check(await this.fetcher(url, { method: "POST", body: truth, headers, signal })));
   }
 
   cancel(reconstruction: string): Promise<Reconstruction> {

@@ -1,10 +1,12 @@
 import { Group } from "three";
 import { symmetricRange } from "../geometry/colormaps";
 import { curvatureVectors, norms } from "../geometry/curvature";
-import { boundingBox } from "../geometry/vectors";
+import { diagonal } from "../geometry/vectors";
 import type { Network } from "../state/network";
 import { HairsLayer } from "./hairs";
+import type { UncertainLine } from "../state/result";
 import type { Palette } from "./palette";
+import { TubesLayer } from "./tubes";
 
 const NORMAL_LENGTH = 0.04;
 const SPIKE_LENGTH = 0.12;
@@ -14,16 +16,19 @@ export interface Normals {
   readonly normals: ArrayLike<number>;
 }
 
-/** What stands on the curves: their normals, and spikes as long as their curvature, away from its centre. */
+/** What stands on the curves: their normals, spikes as long as their curvature, away from its centre, and tubes as wide as
+ * they are uncertain. */
 export class Decorations {
   readonly object = new Group();
   readonly #normals: HairsLayer;
   readonly #spikes: HairsLayer;
+  readonly #tubes: TubesLayer;
 
   constructor(palette: Palette) {
     this.#normals = new HairsLayer(palette.accent);
     this.#spikes = new HairsLayer(palette.interior);
-    this.object.add(this.#normals.object, this.#spikes.object);
+    this.#tubes = new TubesLayer(palette.accent);
+    this.object.add(this.#normals.object, this.#spikes.object, this.#tubes.object);
   }
 
   showNormals(normals: Normals | undefined): void {
@@ -40,18 +45,20 @@ export class Decorations {
     if (points.length) this.#spikes.set(points, vectors, (-SPIKE_LENGTH * diagonal([points])) / symmetricRange(norms(vectors)));
   }
 
+  showTubes(lines: readonly UncertainLine[] | undefined, magnified: number): void {
+    this.#tubes.clear();
+    if (lines) this.#tubes.set(lines, magnified);
+  }
+
   recolor(palette: Palette): void {
     this.#normals.recolor(palette.accent);
     this.#spikes.recolor(palette.interior);
+    this.#tubes.recolor(palette.accent);
   }
 
   dispose(): void {
     this.#normals.dispose();
     this.#spikes.dispose();
+    this.#tubes.dispose();
   }
-}
-
-function diagonal(lists: Iterable<ArrayLike<number>>): number {
-  const box = boundingBox(lists);
-  return box ? Math.hypot(...box.max.map((value, axis) => value - (box.min[axis] ?? 0))) : 1;
 }

@@ -1,13 +1,14 @@
-import { BufferAttribute, type BufferGeometry, Matrix4, Mesh } from "three";
+import { type BufferGeometry, Matrix4, Mesh } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { symmetricRange } from "../geometry/colormaps";
+import type { Field, FieldName } from "../state/fields";
 
 export interface LoadedSurface {
-  /** z up, m, with `normal` and `curvature` (mean curvature, 1/m) attributes. */
+  /** z up, m, with normals. */
   readonly geometry: BufferGeometry;
   readonly triangles: number;
-  /** The colour map of the curvature goes from minus this to plus this, 1/m. */
-  readonly curvatureRange: number;
+  /** Curvatures of the vertices, as far as the file has them. */
+  readonly fields: Partial<Record<FieldName, Field>>;
 }
 
 const FROM_Y_UP = new Matrix4().makeRotationX(Math.PI / 2);
@@ -24,11 +25,16 @@ export async function loadSurface(url: string): Promise<LoadedSurface> {
   const geometry = mesh.geometry.clone().applyMatrix4(mesh.matrixWorld).applyMatrix4(FROM_Y_UP);
   if (!geometry.hasAttribute("normal")) geometry.computeVertexNormals();
   const vertices = geometry.getAttribute("position").count;
-  const curvature = geometry.getAttribute("_mean_curvature") ?? new BufferAttribute(new Float32Array(vertices), 1);
-  geometry.setAttribute("curvature", curvature);
   return {
     geometry,
     triangles: (geometry.getIndex()?.count ?? vertices) / 3,
-    curvatureRange: symmetricRange(curvature.array),
+    fields: { ...field("mean", geometry), ...field("gaussian", geometry) },
   };
+}
+
+function field(name: "mean" | "gaussian", geometry: BufferGeometry): Partial<Record<FieldName, Field>> {
+  const attribute = `_${name}_curvature`;
+  if (!geometry.hasAttribute(attribute)) return {};
+  const values = Float32Array.from(geometry.getAttribute(attribute).array);
+  return { [name]: { values, range: symmetricRange(values) } };
 }

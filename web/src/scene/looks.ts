@@ -2,7 +2,9 @@
  * direction to the eye, both in eye space, on one shared material. Uniforms: base (surface colour, linear), value and
  * map (a scalar in -1..1 and its colours). */
 
-export type LookName = "shaded" | "isophotes" | "reflection" | "normals" | "curvature";
+import type { FieldName } from "../state/fields";
+
+export type LookName = "shaded" | "isophotes" | "reflection" | "normals" | FieldName;
 
 export interface Look {
   readonly name: LookName;
@@ -10,6 +12,8 @@ export interface Look {
   readonly hint: string;
   /** Its colours mean something. */
   readonly colored: boolean;
+  /** The values at the vertices that it shows. */
+  readonly field?: FieldName;
   readonly chunk: string;
 }
 
@@ -28,6 +32,11 @@ const LIT = /* glsl */ `
     float wave = abs(fract(phase) - 0.5) * 2.0;
     float sharp = smoothstep(0.5 - width, 0.5 + width, wave);
     return mix(sharp, 0.5, smoothstep(0.35, 0.7, width));
+  }`;
+
+const SCALAR = /* glsl */ `vec3 look(vec3 n, vec3 v) {
+    vec3 color = texture2D(map, vec2(0.5 + 0.5 * clamp(value, -1.0, 1.0), 0.5)).rgb;
+    return color * (0.72 + 0.28 * max(dot(n, v), 0.0));
   }`;
 
 export const looks: readonly Look[] = [
@@ -76,14 +85,28 @@ export const looks: readonly Look[] = [
     }`,
   },
   {
-    name: "curvature",
+    name: "mean",
     label: "Mean curvature",
     hint: "Mean of the principal curvatures, positive where the surface bends away from its outward normal",
     colored: true,
-    chunk: `${LIT} vec3 look(vec3 n, vec3 v) {
-      vec3 color = texture2D(map, vec2(0.5 + 0.5 * clamp(value, -1.0, 1.0), 0.5)).rgb;
-      return color * (0.72 + 0.28 * max(dot(n, v), 0.0));
-    }`,
+    field: "mean",
+    chunk: SCALAR,
+  },
+  {
+    name: "gaussian",
+    label: "Gaussian curvature",
+    hint: "Product of the principal curvatures: positive on bumps and dents, negative on saddles, 0 on what unrolls",
+    colored: true,
+    field: "gaussian",
+    chunk: SCALAR,
+  },
+  {
+    name: "distance",
+    label: "Distance to truth",
+    hint: "From the true surface, positive outside it",
+    colored: true,
+    field: "distance",
+    chunk: SCALAR,
   },
 ];
 

@@ -1,4 +1,5 @@
 import {
+  BufferAttribute,
   type BufferGeometry,
   type Color,
   DataTexture,
@@ -9,11 +10,12 @@ import {
   SRGBColorSpace,
 } from "three";
 import { diverging, sample } from "../geometry/colormaps";
+import type { Field } from "../state/fields";
 import { lookNamed, type LookName } from "./looks";
 import type { Palette } from "./palette";
 
 const vertexShader = /* glsl */ `
-  attribute float curvature;
+  attribute float scalar;
   uniform float range;
   varying vec3 eyeNormal;
   varying vec3 eyePosition;
@@ -22,7 +24,7 @@ const vertexShader = /* glsl */ `
     vec4 eye = modelViewMatrix * vec4(position, 1.0);
     eyeNormal = normalMatrix * normal;
     eyePosition = eye.xyz;
-    value = curvature / range;
+    value = scalar / range;
     gl_Position = projectionMatrix * eye;
   }`;
 
@@ -47,7 +49,7 @@ const after = /* glsl */ `
 export class SurfaceLayer {
   readonly object: Mesh<BufferGeometry, ShaderMaterial>;
 
-  constructor(geometry: BufferGeometry, curvatureRange: number, palette: Palette, look: LookName) {
+  constructor(geometry: BufferGeometry, palette: Palette, look: LookName) {
     const colors = new DataTexture(sample(diverging, 256), 256, 1);
     colors.colorSpace = SRGBColorSpace;
     colors.magFilter = colors.minFilter = LinearFilter;
@@ -64,11 +66,20 @@ export class SurfaceLayer {
         base: { value: palette.surface },
         inside: { value: palette.inside },
         map: { value: colors },
-        range: { value: curvatureRange },
+        range: { value: 1 },
         opacity: { value: 1 },
       },
     });
     this.object = new Mesh(geometry, material);
+    this.field = undefined;
+  }
+
+  /** The values that looks with a scale show. */
+  set field(field: Field | undefined) {
+    const { geometry } = this.object;
+    const values = field?.values ?? new Float32Array(geometry.getAttribute("position").count);
+    geometry.setAttribute("scalar", new BufferAttribute(values, 1));
+    this.#uniform("range").value = field?.range ?? 1;
   }
 
   set look(name: LookName) {

@@ -1,6 +1,7 @@
 import { Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from "three";
 import { boundingBox, type Box, type Vector } from "../geometry/vectors";
 import { roundDown } from "../geometry/units";
+import type { Field } from "../state/fields";
 import type { Network } from "../state/network";
 import type { OverlayContent, Place } from "../state/overlay";
 import { CurvesLayer } from "./curves";
@@ -73,7 +74,7 @@ export class Viewport {
       this.#surface = undefined;
     }
     if (loaded) {
-      this.#surface = new SurfaceLayer(loaded.geometry, loaded.curvatureRange, this.palette, look);
+      this.#surface = new SurfaceLayer(loaded.geometry, this.palette, look);
       this.#scene.add(this.#surface.object);
       this.#fade = this.still ? 1 : 0;
       this.#surface.opacity = this.#fade;
@@ -81,8 +82,12 @@ export class Viewport {
     this.invalidate();
   }
 
-  setLook(look: LookName): void {
-    if (this.#surface) this.#surface.look = look;
+  /** Look at the surface in this way; `field`: the values that the look shows, if it shows any. */
+  setLook(look: LookName, field: Field | undefined): void {
+    if (this.#surface) {
+      this.#surface.look = look;
+      this.#surface.field = field;
+    }
     this.#curves.neutralize(this.#surface !== undefined && lookNamed(look).colored);
     this.invalidate();
   }

@@ -11,7 +11,15 @@ export interface Result {
   readonly gaussMap: Network;
   readonly normals: Float32Array;
   readonly positions: Float32Array;
+  /** Standard uncertainty of every point, m; undefined when the file has none. */
+  readonly uncertain: readonly UncertainLine[] | undefined;
   readonly meshUrl: string | undefined;
+}
+
+/** A segment with the standard uncertainty of each of its points, m. */
+export interface UncertainLine {
+  readonly positions: Float32Array;
+  readonly uncertainty: Float32Array;
 }
 
 /** The parts of report.json that the page reads; everything may be missing. */
@@ -26,6 +34,7 @@ export interface NetworkFile {
   readonly points: readonly (readonly [number, number, number])[];
   readonly normals: readonly (readonly [number, number, number])[];
   readonly nodes: readonly number[];
+  readonly uncertainty?: readonly number[];
   readonly segments: readonly { readonly points: readonly number[]; readonly boundary: boolean; readonly curve: number }[];
 }
 
@@ -45,6 +54,7 @@ export async function loadResult(api: Api, reconstruction: Reconstruction): Prom
     gaussMap: networkFromFile({ ...file, points: file.normals }, marked),
     positions: Float32Array.from(file.points.flat()),
     normals: Float32Array.from(file.normals.flat()),
+    uncertain: uncertainLines(file),
     meshUrl: artifacts["mesh.glb"],
   };
 }
@@ -77,6 +87,15 @@ export function networkFromFile(file: NetworkFile, marked: readonly number[] = [
   return network;
 }
 
+function uncertainLines({ points, segments, uncertainty }: NetworkFile): UncertainLine[] | undefined {
+  return (
+    uncertainty &&
+    segments.map(({ points: line }) => ({
+      positions: Float32Array.from(line.flatMap((i) => [...(points[i] ?? [])])),
+      uncertainty: Float32Array.from(line, (i) => uncertainty[i] ?? 0),
+    }))
+  );
+}
 
 /** Warnings of both halves of the pipeline. */
 export function warningsOf(report: Report): string[] {

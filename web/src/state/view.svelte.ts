@@ -20,6 +20,7 @@ export class ViewStore {
   surface = $state(true);
   normals = $state(false);
   spikes = $state(false);
+  tubes = $state(false);
   plot = $state(false);
   /** True while two points are being picked; the points so far, m. */
   measuring = $state(false);
