@@ -132,8 +132,9 @@ class ServerProcess:
     process: subprocess.Popen[bytes] | None = None
     client: RunningServer | None = None
 
-    def start(self, **options: Any) -> RunningServer:
+    def start(self, host: str = "127.0.0.1", **options: Any) -> RunningServer:
         command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(self.port), "--data-dir", self.data_dir]
+        command += ["--host", host]
         self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL, **options)
         self._hang_up()
         client = self.client = RunningServer(self.port)

@@ -1,9 +1,12 @@
 """What keeps the server from starting is said in words, at once."""
 
 import os
+import re
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +14,7 @@ import pytest
 @pytest.mark.parametrize(
     ("options", "environment", "says"),
     [
-        (["--host", "0.0.0.0"], {}, "TRACEMESH_TOKEN"),
+        ([], {"TRACEMESH_TOKEN": "secret"}, "characters"),
         (["--data-dir", "/proc/nowhere"], {}, "the data folder /proc/nowhere cannot be used"),
         (["--data-dir", "{tmp}/file"], {}, "cannot be used"),
         ([], {"TRACEMESH_DATABASE_URL": "postgresql://nobody@127.0.0.1:1/none"}, "the database cannot be used"),
@@ -35,3 +38,24 @@ def test_it_ends_with_a_line_that_says_why(
     assert done.returncode in (1, 2)
     assert says in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_first_start_off_loopback_prints_the_owners_link_and_never_again(
+    server_process: Any, tmp_path: Path
+) -> None:
+    def started(output: Path) -> tuple[Any, str]:
+        with output.open("w") as file:
+            server = server_process.start(host="0.0.0.0", stdout=file)
+        while "Open" not in output.read_text():
+            assert server_process.process.poll() is None
+            time.sleep(0.05)
+        return server, output.read_text()
+
+    _, first = started(tmp_path / "first")
+    server_process.kill()
+    server, second = started(tmp_path / "second")
+    (secret,) = re.findall(r"http://\S+/\?token=(\S+)", first)
+    assert "token=" not in second
+    assert "tracemesh token create" in second
+    assert server.http.get("/sessions").status_code == 401
+    assert server.http.get("/sessions", headers={"Authorization": f"Bearer {secret}"}).status_code == 200

@@ -25,10 +25,13 @@ def test_no_setting_is_documented_that_does_not_exist() -> None:
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.5", "lab.example"])
-def test_off_loopback_it_does_not_start_without_a_token(host: str) -> None:
-    with pytest.raises(ValidationError, match="TRACEMESH_TOKEN"):
-        Settings(host=host)
-    assert Settings(host=host, token=SecretStr("x" * MIN_TOKEN)).host == host
+def test_off_loopback_a_token_is_demanded(host: str) -> None:
+    assert Settings(host=host).closed
+
+
+def test_on_loopback_a_token_is_demanded_when_there_is_one() -> None:
+    assert not Settings().closed
+    assert Settings(token=SecretStr("x" * MIN_TOKEN)).closed
 
 
 def test_a_token_that_can_be_guessed_is_refused() -> None:

@@ -11,14 +11,20 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    (action,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
-    return dict(action.choices)
+    """By what a person types: `reconstruct`, `token`, `token create` ..."""
+    found = {}
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, sub in action.choices.items():
+                found[name] = sub
+                found |= {f"{name} {rest}": below for rest, below in subparsers(sub).items()}
+    return found
 
 
 @pytest.mark.parametrize("command", sorted(subparsers(build_parser())))
 def test_every_option_is_in_the_section_of_its_command(command: str) -> None:
     text = (ROOT / "docs" / "cli.md").read_text()
-    (section,) = (s for s in text.split("\n## ") if s.startswith(f"tracemesh {command}"))
+    (section,) = (s for s in text.split("\n## ") if s.startswith(f"tracemesh {command.split()[0]}"))
     parser = subparsers(build_parser())[command]
     options = {o for a in parser._actions for o in a.option_strings} - {"-h", "--help"}
     assert options <= {word.strip("`,") for word in section.split()}

@@ -521,6 +521,22 @@ export interface ReconstructionParameters {
   weights: "auto" | "thesis";
 }
 /**
+ * A token that was just made; nobody is told its secret again.
+ */
+export interface NewToken {
+  created: string;
+  expires: string | null;
+  id: string;
+  /**
+   * to about a minute
+   */
+  last_used: string | null;
+  name: string;
+  role: "viewer" | "device" | "owner";
+  session: string | null;
+  token: string;
+}
+/**
  * A node was marked at a sample of a curve; nodes with the same number are the same point of the object.
  */
 export interface NodeMark {
@@ -688,6 +704,21 @@ export interface Reference1 {
   magnetic: [number, number, number];
 }
 /**
+ * GET /rights: what whoever asks may do.
+ */
+export interface Rights {
+  /**
+   * the server demands a token: who is to come in needs one
+   */
+  closed: boolean;
+  expires: string | null;
+  role: "viewer" | "device" | "owner";
+  /**
+   * only here; none: everywhere on the server
+   */
+  session: string | null;
+}
+/**
  * A block of samples; every column that is present has one entry per sample.
  *
  * Orientation comes as `acceleration` and `magnetic`, or as `quaternion`, or as `tangent` and `normal`; distance as
@@ -786,6 +817,39 @@ export interface Snapshot {
   reconstruction: Reconstruction | null;
   session: string;
   type: "live.snapshot";
+}
+/**
+ * A token, without its secret.
+ */
+export interface Token {
+  created: string;
+  expires: string | null;
+  id: string;
+  /**
+   * to about a minute
+   */
+  last_used: string | null;
+  name: string;
+  role: "viewer" | "device" | "owner";
+  session: string | null;
+}
+/**
+ * POST /tokens.
+ */
+export interface TokenCreate {
+  /**
+   * s from now; none: until it is revoked
+   */
+  expires_in: number | null;
+  /**
+   * who or what it is for
+   */
+  name: string;
+  role: "viewer" | "device" | "owner";
+  /**
+   * the only session that it opens; none: the server
+   */
+  session: string | null;
 }
 /**
  * The server's answer to hello.

@@ -12,7 +12,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 
-from tracemesh.api.access import Access
+from tracemesh.api.access.gate import Gate
+from tracemesh.api.access.tokens import Tokens
 from tracemesh.api.comparing import Comparer
 from tracemesh.api.compression import WeakTags
 from tracemesh.api.errors import install_handlers
@@ -32,6 +33,7 @@ from tracemesh.api.routes import (
     reconstructions,
     recordings,
     sessions,
+    tokens,
 )
 from tracemesh.api.services import Services
 from tracemesh.errors import Unavailable
@@ -67,14 +69,26 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
         swagger_ui_oauth2_redirect_url=None,
         middleware=[
-            Middleware(Access, settings=settings),
+            Middleware(Gate, settings=settings),
             Middleware(WeakTags),
             Middleware(GZipMiddleware, compresslevel=4),
         ],
     )
     install_handlers(app)
     api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
-    routes = (archives, sessions, curves, recordings, proposals, comparisons, reconstructions, devices, ingest, live)
+    routes = (
+        archives,
+        sessions,
+        curves,
+        recordings,
+        proposals,
+        comparisons,
+        reconstructions,
+        devices,
+        ingest,
+        live,
+        tokens,
+    )
     for module in routes:
         api.include_router(module.router)
     app.include_router(api)
@@ -107,7 +121,9 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     store = open_artifacts(settings)
     tidying = asyncio.create_task(_collect_garbage(database, store))
     try:
-        yield Services(settings, database, store, recorder, hub, previewer, comparer, metrics, runner, loop)
+        yield Services(
+            settings, database, store, recorder, hub, previewer, comparer, metrics, runner, loop, Tokens(database)
+        )
     finally:
         tidying.cancel()
         await asyncio.to_thread(runner.close)

@@ -1,12 +1,15 @@
 """Runs the service in one process."""
 
+import asyncio
 import gc
 import logging
+import socket
 
 import uvicorn
 
 from tracemesh.api.app import create_app
 from tracemesh.api.websocket import SteadyReading
+from tracemesh.api.welcome import greet
 from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import open_artifacts
@@ -42,7 +45,7 @@ def serve(settings: Settings) -> None:
     )
     _collect_garbage_seldom()
     try:
-        uvicorn.Server(configuration).run()
+        _Server(configuration, settings).run()
     except SystemExit:  # uvicorn's word for an address that it could not have; its log says why
         raise ResourceError(f"cannot listen at {settings.host}:{settings.port}") from None
 
@@ -52,6 +55,20 @@ def _collect_garbage_seldom() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(*COLLECT_AFTER)
+
+
+class _Server(uvicorn.Server):
+    """Says how to come in as soon as it listens."""
+
+    def __init__(self, configuration: uvicorn.Config, settings: Settings) -> None:
+        super().__init__(configuration)
+        self._settings = settings
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        port = self.servers[0].sockets[0].getsockname()[1]
+        if self._settings.closed:
+            await asyncio.to_thread(greet, self._settings, port)
 
 
 def _prepare(settings: Settings) -> None:

@@ -9,6 +9,8 @@ from fastapi import Depends, Header
 from sqlalchemy.orm import Session as Transaction
 from starlette.requests import HTTPConnection
 
+from tracemesh.api.access.roles import Principal
+from tracemesh.api.access.tokens import Tokens
 from tracemesh.api.comparing import Comparer
 from tracemesh.api.live.hub import Hub
 from tracemesh.api.metrics import Metrics
@@ -34,6 +36,7 @@ class Services:
     metrics: Metrics
     runner: JobRunner
     loop: asyncio.AbstractEventLoop
+    tokens: Tokens
 
     def edited(self, session: str) -> None:
         """Curves or marks of a session were edited; from any thread."""
@@ -48,7 +51,15 @@ def services(connection: HTTPConnection) -> Services:
     return found
 
 
+def principal(connection: HTTPConnection) -> Principal:
+    """Who asks, as the gate found."""
+    found = connection.scope["principal"]
+    assert isinstance(found, Principal)
+    return found
+
+
 UseServices = Annotated[Services, Depends(services)]
+UsePrincipal = Annotated[Principal, Depends(principal)]
 
 
 def reading(services: UseServices) -> Iterator[Transaction]:

@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails
 from tracemesh.cli.reconstruct import add_reconstruct, add_surface
 from tracemesh.cli.service import add_backup, add_demo, add_doctor, add_serve
 from tracemesh.cli.shapes import add_evaluate, add_simulate
+from tracemesh.cli.tokens import add_token
 from tracemesh.errors import TracemeshError
 
 
@@ -51,6 +52,8 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"tracemesh {version('tracemesh')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for add in (add_reconstruct, add_surface, add_evaluate, add_simulate, add_serve, add_backup, add_doctor, add_demo):
+    of_files = (add_reconstruct, add_surface, add_evaluate, add_simulate)
+    of_servers = (add_serve, add_token, add_backup, add_doctor, add_demo)
+    for add in (*of_files, *of_servers):
         add(commands)
     return parser

@@ -20,6 +20,8 @@ from sqlalchemy import (
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
+from tracemesh.wire.access import Role
+
 Long = BigInteger().with_variant(Integer(), "sqlite")
 """64 bits on every database; only INTEGER counts by itself on SQLite, and holds 64 bits there."""
 INTERACTIVE, BATCH = 0, 1
@@ -64,6 +66,21 @@ class SessionRow(Base):
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     name: Mapped[str] = mapped_column(String(200), default="")
     created: Mapped[datetime] = mapped_column(UtcTime, default=now, index=True)
+
+
+class TokenRow(Base):
+    """Lets its bearer in: to one session, or to the whole server. Of the secret only a digest is kept."""
+
+    __tablename__ = "tokens"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    digest: Mapped[str] = mapped_column(String(64), unique=True)
+    role: Mapped[Role] = mapped_column(String(16))
+    session_id: Mapped[str | None] = mapped_column(ForeignKey("sessions.id", ondelete="CASCADE"), index=True)
+    name: Mapped[str] = mapped_column(String(200), default="")
+    created: Mapped[datetime] = mapped_column(UtcTime, default=now)
+    expires: Mapped[datetime | None] = mapped_column(UtcTime)
+    last_used: Mapped[datetime | None] = mapped_column(UtcTime)
 
 
 class RecordingRow(Base):

@@ -6,8 +6,9 @@ import logging
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
 
+from tracemesh.api.access.roles import Principal
 from tracemesh.api.pace import Pace
-from tracemesh.api.services import Services, UseServices
+from tracemesh.api.services import Services, UsePrincipal, UseServices
 from tracemesh.api.sockets import first_to_end
 from tracemesh.errors import Refused
 from tracemesh.storage.devices import proposal
@@ -26,10 +27,10 @@ log = logging.getLogger(__name__)
 
 
 @router.websocket("/ingest")
-async def ingest(socket: WebSocket, services: UseServices) -> None:
+async def ingest(socket: WebSocket, services: UseServices, principal: UsePrincipal) -> None:
     """The device protocol: see docs/api.md."""
     await socket.accept()
-    device = _Connection(socket, services)
+    device = _Connection(socket, services, principal)
     try:
         await device.serve()
     except Refused as reason:
@@ -43,9 +44,10 @@ async def ingest(socket: WebSocket, services: UseServices) -> None:
 class _Connection:
     """One device's connection; the recorder's view of it is a Sender."""
 
-    def __init__(self, socket: WebSocket, services: Services) -> None:
+    def __init__(self, socket: WebSocket, services: Services, principal: Principal) -> None:
         self._socket = socket
         self._services = services
+        self._principal = principal
         self._state: RecordingState | None = None
         self._acknowledged: int | None = None
         self.failure: Refused | None = None
@@ -67,6 +69,7 @@ class _Connection:
         hello = _parsed(payload)
         if not isinstance(hello, Hello):
             raise Refused("malformed", f"wanted hello first, got {hello.type}")
+        hello = self._in_reach(hello)
         if self._services.recorder.open_count >= self._services.settings.max_devices:
             raise Refused("limit", f"{self._services.settings.max_devices} devices are connected already")
         self._state = await self._services.recorder.open(hello, payload, self)
@@ -81,6 +84,15 @@ class _Connection:
     def _known_calibration(self, key: int) -> str | None:
         with self._services.database.read() as transaction:
             return proposal(transaction, key)
+
+    def _in_reach(self, hello: Hello) -> Hello:
+        """A token of one session records into that one, also when the device names none."""
+        own = self._principal.session
+        if own is None or hello.session == own:
+            return hello
+        if hello.session is not None:
+            raise Refused("forbidden", f"this token records into session {own} only, not into {hello.session}")
+        return hello.model_copy(update={"session": own})
 
     async def refuse(self, reason: Refused) -> None:
         """Say why, and close."""

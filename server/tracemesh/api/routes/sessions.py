@@ -67,6 +67,7 @@ def update(session: Identifier, change: SessionUpdate, transaction: Writing) -> 
 
 @router.delete("/{session}", status_code=204)
 async def delete(session: Identifier, services: UseServices) -> None:
-    """Delete a session with everything in it; devices that record into it are cut off."""
+    """Delete a session with everything in it; devices that record into it are cut off, its tokens end."""
     await services.recorder.delete_session(session)
     services.edited(session)
+    services.tokens.forget()
