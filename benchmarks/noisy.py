@@ -41,7 +41,7 @@ def _error_row(known: KnownScan) -> tuple[Cell, ...]:
     return (known.name, len(network.points), error.mean, wanted, error.largest, unsmoothed.mean)
 
 
-def uncertainty(data: Data, names: tuple[str, ...] = tuple(SHAPES), seeds: int = 6) -> Table:
+def uncertainty(data: Data, names: tuple[str, ...] = tuple(SHAPES), seeds: int = 30) -> Table:
     """Table of true errors over stated uncertainties; names: of built-in shapes, each scanned `seeds` times."""
     scores = {f"{name} (built in), {seeds} scans": _scores(name, seeds) for name in names}
     scores |= {known.name: [normalised_errors(known)] for known in data.scans("noisy")}

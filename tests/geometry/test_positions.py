@@ -116,6 +116,21 @@ def test_the_thesis_rows_agree_to_first_order_and_edges_are_closer() -> None:
     assert ours_coarse < thesis_coarse / 20 and ours_fine < thesis_fine / 100
 
 
+def test_gaps_are_shared_out_by_the_covariances_of_segments() -> None:
+    """Against a dense weighted least-squares problem in the nodes."""
+    samples, _ = exact_samples("leaf", 0.05)
+    layout, random = samples.layout, np.random.default_rng(1)
+    edges = edge_vectors(layout, samples.frames @ exp(0.1 * random.standard_normal((layout.size, 3))))
+    root = random.standard_normal((len(layout.segments), 3, 3)) + 2 * np.eye(3)
+    rows = np.zeros((len(root), 3, layout.node_count, 3))
+    for k, (a, b) in enumerate(layout.segment_nodes):
+        rows[k, :, b], rows[k, :, a] = np.linalg.inv(root[k]), -np.linalg.inv(root[k])
+    wanted = np.linalg.solve(root, segment_vectors(layout, edges)[:, :, None])
+    dense = np.linalg.lstsq(rows.reshape(wanted.size, -1), wanted.ravel(), rcond=None)[0].reshape(-1, 3)
+    points = solve_positions(layout, edges, root @ np.swapaxes(root, 1, 2)).points
+    np.testing.assert_allclose(points[layout.marks], (dense - dense.mean(axis=0))[layout.nodes], atol=1e-9)
+
+
 @pytest.mark.parametrize("turns", [1, 2])
 def test_a_circle_alone_closes_on_itself(turns: int) -> None:
     arc = np.linspace(0, 1, 41)

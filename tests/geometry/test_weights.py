@@ -1,6 +1,7 @@
 """Automatic smoothing lengths against the best possible ones, and the spline behind them against the regression."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from tracemesh.geometry.curves.regression import RegressionSolver
 from tracemesh.geometry.curves.resampling import resample
 from tracemesh.geometry.curves.samples import NetworkSamples
 from tracemesh.geometry.curves.weights import choose_weights, noise_level
-from tracemesh.geometry.rotations import log
+from tracemesh.geometry.rotations import exp, log
+from tracemesh.geometry.scan import Scan
 
 STEP = 0.015
 
@@ -49,22 +51,45 @@ def test_the_noise_of_the_frames_is_found(faulty_scan: Callable, noise: float) -
     assert choose_weights(curves, samples, STEP).noise == pytest.approx(noise, rel=0.05)
 
 
+LOPSIDED = np.array([0.006, 0.012, 0.04])
+"""rad about the world's axes: compass and gravity know the attitude about the vertical worst."""
+
+
+def shaken(faulty: Any, seed: int) -> Any:
+    """The scan with frames turned at random, mostly about the vertical."""
+    random = np.random.default_rng(seed)
+    curves = []
+    for curve in faulty.scan.curves:
+        turn = exp(LOPSIDED * random.standard_normal((len(curve.distance), 3)))
+        tangent, normal = ((turn @ v[:, :, None])[:, :, 0] for v in (curve.tangent, curve.normal))
+        curves.append(replace(curve, tangent=tangent, normal=normal))
+    return replace(faulty, scan=Scan(tuple(curves)))
+
+
+def test_the_directions_of_the_noise_are_found(faulty_scan: Callable) -> None:
+    curves, samples, _ = prepared(shaken(faulty_scan("leaf"), 1))
+    found = choose_weights(curves, samples, STEP).covariance
+    np.testing.assert_allclose(np.sqrt(np.diag(found)), LOPSIDED, rtol=0.1)
+    assert abs(found - np.diag(np.diag(found))).max() < 0.1 * LOPSIDED[1] * LOPSIDED[2]
+
+
 def test_noise_levels_are_those_of_integrated_and_smoothed_noise(faulty_scan: Callable) -> None:
-    """Predicted standard deviations of segment vectors and of smoothed normals, against twenty scans."""
-    moved, turned, levels = [], [], []
+    """Predicted covariances of segment vectors and of smoothed frames, against those of twenty scans."""
+    faulty, moved, turned = faulty_scan("cone"), [], []
     for seed in range(20):
-        curves, samples, truth = prepared(faulty_scan("cone", seed=seed, noise=0.03))
+        curves, samples, truth = prepared(shaken(faulty, seed))
         choice, layout = choose_weights(curves, samples, STEP), samples.layout
-        level = noise_level(curves, choice, STEP)
-        start, end = layout.segment_rows[0]
-        wrong = (samples.frames - truth)[start:end, :, 0]
-        moved.append(np.sum(wrong, axis=0) * layout.lengths[0])
+        level = noise_level(curves, choice, STEP, layout)
+        expected = level.of_segments(layout.segment_lengths)
+        starts = np.searchsorted(layout.edges, layout.segment_rows[:, 0])
+        wrong = layout.lengths[:, None] * (samples.frames - truth)[layout.edges, :, 0]
+        error = np.add.reduceat(wrong, starts, axis=0)
+        moved.append(np.einsum("si,si->s", error, np.linalg.solve(expected, error[:, :, None])[:, :, 0]))
         inner = (layout.arc > 0.2) & (layout.arc < layout.arc.max() - 0.2)
-        turned.append(np.sum((choice.frames - truth)[inner, :, 1] ** 2, axis=1).mean() / 2)
-        levels.append([level.walk[0] * layout.segment_lengths[0], level.normal[0] ** 2])
-    expected = np.mean(levels, axis=0)
-    assert np.mean(np.array(moved) ** 2) == pytest.approx(expected[0], rel=0.6)
-    assert np.mean(turned) == pytest.approx(expected[1], rel=0.6)
+        about = log(choice.frames[inner] @ np.swapaxes(truth[inner], 1, 2))
+        turned.append(np.mean(about**2, axis=0) / np.diagonal(level.turn, axis1=1, axis2=2).mean(axis=0))
+    assert np.mean(moved) == pytest.approx(3, rel=0.3)
+    np.testing.assert_allclose(np.mean(turned, axis=0), 1, rtol=0.5)
 
 
 def test_the_spline_is_the_regression_without_nodes(faulty_scan: Callable) -> None:

@@ -32,14 +32,26 @@ _END_DEVIATION = 2.0  # of a spline at its end, over that inside: its kernel is 
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """Expected errors that no curve has as a whole. walk: (c,) m, variance per metre travelled of a curve's positions,
-    per axis. normal: (c,) rad, standard deviation of a smoothed normal inside a curve, per axis. drift: relative to a
-    segment's length, what no device does better.
+    """Expected errors that no curve has as a whole.
+
+    walk: (s, 3, 3) m, covariance per metre travelled of positions along each segment. turn: (m, 3, 3) rad^2, covariance
+    of the rotation of a smoothed frame at each mark, if it is inside a curve; both in the world's axes. drift: relative
+    to a segment's length, what no device does better.
     """
 
     walk: Floats
-    normal: Floats
+    turn: Floats
     drift: float
+
+    def alike(self) -> "NoiseLevel":
+        """As much noise in all directions."""
+        walk, turn = (np.trace(c, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3) for c in (self.walk, self.turn))
+        return NoiseLevel(walk, turn, self.drift)
+
+    def of_segments(self, lengths: Floats) -> Floats:
+        """Covariance (s, 3, 3), m^2, of segment vectors of lengths (s,), m."""
+        length = lengths[:, None, None]
+        return self.walk * length + (self.drift * length) ** 2 * np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -91,6 +103,11 @@ def tangent_bases(normals: Floats) -> Floats:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
+def _whitening(covariance: Floats) -> Floats:
+    """Matrices W (k, d, d) such that W times errors of covariances (k, d, d) have covariance 1."""
+    return np.linalg.inv(np.linalg.cholesky(covariance))
+
+
 def _sparse(rows: list[Ints], columns: list[Ints], values: list[Floats], shape: tuple[int, int]) -> csc_array:
     entries = np.concatenate([v.ravel() for v in values])
     index = tuple(
@@ -105,52 +122,55 @@ class Misclosures:
 
     def __init__(self, layout: Layout, frames: Floats, noise: NoiseLevel) -> None:
         """frames: (n, 3, 3) at the layout's rows."""
-        self.layout, self._frames = layout, frames
+        self.layout, self.noise, self._frames = layout, noise, frames
         self.curves, self.marks = len(layout.closed), len(layout.marks)
         self.size = 4 * self.curves + self.marks
-        self.segments = self._segment_equations(noise)
-        self.normals = self._normal_equations(noise)
+        self.segments = self._segment_equations()
+        self.normals = self._normal_equations()
 
     def _columns(self, curve: Ints) -> tuple[Ints, Ints]:
         """Columns (k, 3) of the rotations and (k,) of the scales of curves (k,)."""
         return 3 * curve[:, None] + np.arange(3), 3 * self.curves + curve
 
-    def _segment_equations(self, noise: NoiseLevel) -> Equations:
+    def _segment_equations(self) -> Equations:
         layout = self.layout
         edges = edge_vectors(layout, self._frames)
         vectors, gaps = segment_vectors(layout, edges), solve_positions(layout, edges).gaps
         curve, start = layout.segment_curve, layout.segments
-        length = layout.segment_lengths
-        weight = 1 / np.sqrt(noise.walk[curve] * length + (noise.drift * length) ** 2)
+        weight = _whitening(self.noise.of_segments(layout.segment_lengths))
         tangent = self._frames[layout.marks, :, 0]
         row = 3 * np.arange(len(start))[:, None] + np.arange(3)
         rotation, scale = self._columns(curve)
         shift = 4 * self.curves + start
-        w = weight[:, None]
+        columns = np.stack([vectors, -tangent[start], tangent[start + 1]], axis=2)
+        scaled, before, after = np.moveaxis(weight @ columns, 2, 0)
         shared = _sparse(
             [row[:, :, None], row, row, row],
             [rotation[:, None, :], scale[:, None], shift[:, None], shift[:, None] + 1],
-            [-w[:, :, None] * hat(vectors), w * vectors, -w * tangent[start], w * tangent[start + 1]],
+            [-weight @ hat(vectors), scaled, before, after],
             (row.size, self.size),
         )
         a, b = layout.segment_nodes.T
         free = _sparse(
-            [row, row],
-            [3 * a[:, None] + np.arange(3), 3 * b[:, None] + np.arange(3)],
-            [np.repeat(-w, 3, axis=1), np.repeat(w, 3, axis=1)],
+            [row[:, :, None], row[:, :, None]],
+            [(3 * a[:, None] + np.arange(3))[:, None], (3 * b[:, None] + np.arange(3))[:, None]],
+            [-weight, weight],
             (row.size, 3 * layout.node_count),
         )
-        return Equations((w * gaps).ravel(), -free[:, 3:], shared)  # node 0 stays where it is
+        return Equations((weight @ gaps[:, :, None]).ravel(), -free[:, 3:], shared)  # node 0 stays where it is
 
-    def _normal_equations(self, noise: NoiseLevel) -> Equations:
+    def _normal_equations(self) -> Equations:
         layout, marks, node = self.layout, self.layout.marks, self.layout.nodes
         normal, curve = self._frames[marks, :, 1], layout.curve[marks]
         mean = np.zeros((layout.node_count, 3))
         np.add.at(mean, node, normal)
         mean = normalized(mean)
         at_end = np.isin(marks, layout.first[:-1]) | np.isin(marks, layout.first[1:] - 1)
-        level = 1 / (noise.normal[curve] * np.where(at_end, _END_DEVIATION, 1.0))
-        basis = level[:, None, None] * tangent_bases(mean)[node]
+        level = np.where(at_end, _END_DEVIATION, 1.0)[:, None, None]
+        basis = tangent_bases(mean)[node]
+        effect = level * (basis @ hat(normal))
+        weight = _whitening(effect @ self.noise.turn @ np.swapaxes(effect, 1, 2))
+        basis = weight @ basis
         row = 2 * np.arange(len(marks))[:, None] + np.arange(2)
         rotation, _ = self._columns(curve)
         shift = 4 * self.curves + np.arange(len(marks))
@@ -161,8 +181,9 @@ class Misclosures:
             [-basis @ hat(normal), bend],
             (row.size, self.size),
         )
-        both = np.repeat(level[:, None], 2, axis=1)
-        free = _sparse([row], [2 * node[:, None] + np.arange(2)], [both], (row.size, 2 * len(mean)))
+        free = _sparse(
+            [row[:, :, None]], [(2 * node[:, None] + np.arange(2))[:, None]], [weight], (row.size, 2 * len(mean))
+        )
         return Equations(np.einsum("mij,mj->mi", basis, mean[node] - normal).ravel(), -free, shared)
 
     def _normal_rates(self) -> Floats:

@@ -53,29 +53,31 @@ def check_connected(layout: Layout, curve_indices: Ints) -> None:
 
 
 def node_positions(layout: Layout, vectors: Floats, weights: Floats) -> Floats:
-    """Positions (k, 3), m, with mean zero, of nodes joined by weighted (s,) segment vectors (s, 3)."""
-    a, b = layout.segment_nodes.T
+    """Positions (k, 3), m, with mean zero, of nodes joined by segment vectors (s, 3) of weights (s, 3, 3)."""
     count = layout.node_count
     if count == 1:
         return np.zeros((1, 3))
-    row, column = np.concatenate([a, b, a, b]), np.concatenate([a, b, b, a])
-    laplacian = coo_array((np.concatenate([weights, weights, -weights, -weights]), (row, column)), shape=(count, count))
-    right = np.zeros((count, 3))
-    np.add.at(right, b, weights[:, None] * vectors)
-    np.add.at(right, a, -weights[:, None] * vectors)
-    points = np.zeros((count, 3))
-    points[1:] = splu(laplacian.tocsc()[1:, 1:]).solve(right[1:])
-    points -= points.mean(axis=0)
-    return points
+    ends = 3 * layout.segment_nodes[:, :, None] + np.arange(3)
+    a, b = ends[:, 0], ends[:, 1]
+    rows, columns = np.stack([a, b, a, b], axis=1)[..., None], np.stack([a, b, b, a], axis=1)[:, :, None]
+    values = np.stack([weights, weights, -weights, -weights], axis=1)
+    index = tuple(np.broadcast_to(i, values.shape).ravel() for i in (rows, columns))
+    laplacian = coo_array((values.ravel(), index), shape=(3 * count, 3 * count)).tocsc()[3:, 3:]
+    pull = (weights @ vectors[:, :, None])[:, :, 0]
+    right = np.bincount(b.ravel(), pull.ravel(), 3 * count) - np.bincount(a.ravel(), pull.ravel(), 3 * count)
+    points = np.concatenate([np.zeros(3), splu(laplacian).solve(right[3:])]).reshape(-1, 3)
+    return np.asarray(points - points.mean(axis=0))
 
 
-def solve_positions(layout: Layout, edges: Floats) -> Positions:
+def solve_positions(layout: Layout, edges: Floats, covariance: Floats | None = None) -> Positions:
     """Positions of a connected layout's rows from its edge vectors (e, 3), m.
 
-    Minimises the sum over edges of |x_{k+1} - x_k - e_k|^2 / h_k: every metre travelled errs alike.
+    Minimises the sum over edges of |x_{k+1} - x_k - e_k|^2 / h_k: every metre travelled errs alike; or else what
+    segments lack to close, by the covariance (s, 3, 3), m^2, of their errors.
     """
     vectors = segment_vectors(layout, edges)
-    nodes = node_positions(layout, vectors, 1 / layout.segment_lengths)
+    spread = layout.segment_lengths[:, None, None] * np.eye(3) if covariance is None else covariance
+    nodes = node_positions(layout, vectors, np.asarray(np.linalg.inv(spread)))
     a, b = layout.segment_nodes.T
     gaps = nodes[b] - nodes[a] - vectors
     rates = gaps / layout.segment_lengths[:, None]

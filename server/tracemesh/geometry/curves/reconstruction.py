@@ -152,7 +152,8 @@ class NetworkReconstruction:
     def _positions(self, layout: Layout, frames: Floats) -> Positions:
         if self._measured.is_polyline:
             return Positions(points_on_polyline(self._measured, layout), self._measured.positions.gaps)
-        return solve_positions(layout, edge_vectors(layout, frames))
+        covariance = self._closed.closing.covariance(layout) if self._closed else None
+        return solve_positions(layout, edge_vectors(layout, frames), covariance)
 
     def _warnings(self, layout: Layout, positions: Positions) -> list[str]:
         if self._closed is None:

@@ -60,7 +60,7 @@ def _without_motion(deviations: Floats, points: Floats) -> Floats:
 def point_uncertainty(adjustment: Adjustment, layout: Layout, points: Floats, tangent: Floats, walk: Floats) -> Floats:
     """Standard uncertainty (n,), m, of points (n, 3) at a layout's rows: the root mean square distance from the truth.
 
-    tangent: (n, 3). walk: (c,) m, variance per metre and axis of each curve's positions.
+    tangent: (n, 3). walk: (s, 3, 3) m, covariance per metre of positions along each segment.
     """
     rows = np.union1d(layout.marks, np.linspace(0, layout.size - 1, _ROWS).astype(np.int64))
     count = int(np.clip(_NUMBERS // (3 * len(rows)), _FEWEST, _MOST))
@@ -68,6 +68,7 @@ def point_uncertainty(adjustment: Adjustment, layout: Layout, points: Floats, ta
     moved = _without_motion(_deviations(layout, rows, points, tangent, drawn), points[rows])
     common = np.interp(np.arange(layout.size), rows, np.einsum("kid,kid->k", moved, moved) / count)
     t = _share(layout, np.arange(layout.size))
-    bridge = 3 * walk[layout.curve] * layout.segment_lengths[layout.row_segment] * t * (1 - t)
+    total = np.trace(walk, axis1=1, axis2=2) * layout.segment_lengths
+    bridge = total[layout.row_segment] * t * (1 - t)
     result: Floats = np.sqrt(common + bridge)
     return result

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from tracemesh.geometry.curves.energy import Weights
 from tracemesh.geometry.curves.misclosure import NoiseLevel
 from tracemesh.geometry.curves.placement import PlacedCurve
-from tracemesh.geometry.curves.samples import NetworkSamples
+from tracemesh.geometry.curves.samples import Layout, NetworkSamples
 from tracemesh.geometry.curves.spline import Bands, DevelopedSpline, Offsets, measured_offsets
+from tracemesh.geometry.rotations import hat
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,14 +32,19 @@ _STRETCHES = (0.25, 0.5, 1.0)
 
 @dataclass(frozen=True)
 class Choice:
-    """weights: those that predict best. noise: rad, root mean square rotation error per axis of a measured frame.
+    """weights: those that predict best. covariance: (3, 3) rad^2, of the rotation error of a measured frame, world.
 
     frames: (n, 3, 3), the spline's with these weights; curves do not know of each other in it.
     """
 
     weights: Weights
-    noise: float
+    covariance: Floats
     frames: Floats
+
+    @property
+    def noise(self) -> float:
+        """Root mean square rotation error per axis of a measured frame, rad."""
+        return float(np.sqrt(np.trace(self.covariance) / 3))
 
 
 def _folds(curves: Sequence[PlacedCurve], step: float) -> Ints:
@@ -65,13 +71,18 @@ class _Trials:
             self._data.append(spline.data_band(offsets, offsets.weight * factor))
             self._left_out.append(offsets.part(np.flatnonzero(fold == left_out)))
 
+    def covariance(self, weights: Weights) -> Floats:
+        """Covariance (3, 3) rad^2, world, of the rotation errors of predicted left-out frames."""
+        penalty = self._spline.penalty_band(weights)
+        total = np.zeros((3, 3))
+        for left_out, data in zip(self._left_out, self._data, strict=True):
+            error = left_out.predicted(self._spline.solve(data, penalty)) - left_out.value
+            total += error.T @ error
+        return total / self._count
+
     def error(self, weights: Weights) -> float:
         """Root mean square rotation error per axis, rad, of predicted left-out frames."""
-        penalty = self._spline.penalty_band(weights)
-        total = 0.0
-        for left_out, data in zip(self._left_out, self._data, strict=True):
-            total += float(np.sum((left_out.predicted(self._spline.solve(data, penalty)) - left_out.value) ** 2))
-        return float(np.sqrt(total / (3 * self._count)))
+        return float(np.sqrt(np.trace(self.covariance(weights)) / 3))
 
 
 def _vertex(logs: list[float], errors: list[float]) -> float:
@@ -88,8 +99,8 @@ def choose_weights(curves: Sequence[PlacedCurve], samples: NetworkSamples, step:
     few = curves[: max(1, int(np.searchsorted(samples.layout.first, _ENOUGH_ROWS)))]
     part = samples if len(few) == len(curves) else samples.first_curves(len(few))
     trials = _Trials(DevelopedSpline(part), measured_offsets(few, part), _folds(few, step))
-    weights, noise = _search(trials, step)
-    return Choice(weights, noise, smooth_frames(curves, samples, weights))
+    weights, covariance = _search(trials, step)
+    return Choice(weights, covariance, smooth_frames(curves, samples, weights))
 
 
 def smooth_frames(curves: Sequence[PlacedCurve], samples: NetworkSamples, weights: Weights) -> Floats:
@@ -98,9 +109,11 @@ def smooth_frames(curves: Sequence[PlacedCurve], samples: NetworkSamples, weight
     return spline.frames(spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(weights)))
 
 
-def _search(trials: _Trials, step: float) -> tuple[Weights, float]:
-    """Best weights and their error: downhill over trial bends from one step on, a parabola through the lowest three,
-    then up the stretches for as long as they help.
+def _search(trials: _Trials, step: float) -> tuple[Weights, Floats]:
+    """Best weights and the covariance of their errors.
+
+    Downhill over trial bends from one step on, a parabola through the lowest three, then up the stretches for as long
+    as they help.
     """
     error = cache(lambda i: trials.error(Weights(0.0, float(_BENDS[i]) * step)))
     best, before = int(np.flatnonzero(_BENDS == 1.0)[0]), -1
@@ -112,22 +125,26 @@ def _search(trials: _Trials, step: float) -> tuple[Weights, float]:
         around = range(best - 1, best + 2)
         bend = float(np.exp(_vertex([float(np.log(_BENDS[i])) for i in around], [error(i) for i in around])))
     found = Weights(0.0, bend * step)
-    least = trials.error(found)
+    least = trials.covariance(found)
     for stretch in _STRETCHES:
         trial = Weights(stretch * step, bend * step)
-        there = trials.error(trial)
-        if there >= least:
+        there = trials.covariance(trial)
+        if np.trace(there) >= np.trace(least):
             break
         found, least = trial, there
     return found, least
 
 
-def noise_level(curves: Sequence[PlacedCurve], choice: Choice, step: float) -> NoiseLevel:
-    """Expected random errors of positions and smoothed normals along curves whose frames have independent errors.
+def noise_level(curves: Sequence[PlacedCurve], choice: Choice, step: float, layout: Layout) -> NoiseLevel:
+    """Expected random errors of positions and smoothed frames along curves whose measured frames err independently.
 
-    Of a frame's errors about three axes two turn the tangent.
+    A rotation error w moves a tangent t by w x t.
     """
     spacing = np.array([c.length / (len(c.arc) - 1) for c in curves])
-    density = choice.noise**2 * spacing
     width = max(choice.weights.bend, choice.weights.stretch, step)
-    return NoiseLevel(density * 2 / 3, np.sqrt(_SPLINE_GAIN * density / width + _LEAST_TILT**2), _LEAST_DRIFT)
+    turned = hat(choice.frames[layout.edges, :, 0])
+    moved = layout.lengths[:, None, None] * (turned @ choice.covariance @ np.swapaxes(turned, 1, 2))
+    along = np.add.reduceat(moved, np.searchsorted(layout.edges, layout.segment_rows[:, 0]), axis=0)
+    walk = (spacing[layout.segment_curve] / layout.segment_lengths)[:, None, None] * along
+    smooth = (_SPLINE_GAIN / width * spacing)[layout.curve[layout.marks], None, None] * choice.covariance
+    return NoiseLevel(walk, smooth + _LEAST_TILT**2 * np.eye(3), _LEAST_DRIFT)
