@@ -240,3 +240,30 @@ def test_a_damaged_recording_gives_a_scan_or_an_error_for_people(data: st.DataOb
     except TracemeshError:
         return
     assert all(np.isfinite(c.tangent).all() and np.isfinite(c.distance).all() for c in scan.curves)
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.05, 0.0), (0.03, 0.0, 0.0), (-0.02, 0.04, 0.0)])
+def test_a_wheel_beside_the_sensors_is_taken_into_account(offset: tuple[float, float, float]) -> None:
+    """Once round a sphere of radius 0.5 m: what was measured behind the wheel, and on another radius."""
+    angle = np.linspace(0.0, 2 * np.pi, 629)
+    behind = offset[0] / 0.5
+    normal, tangent = (
+        np.column_stack([np.cos(a), np.sin(a), 0 * a]) for a in (angle - behind, angle - behind + np.pi / 2)
+    )
+    columns = {
+        "tangent": tangent.tolist(),
+        "normal": normal.tolist(),
+        "distance": ((0.5 + offset[1]) * angle).tolist(),
+    }
+    block = Samples.model_validate({"seq": 0, "curve": 0, "first_sample": 0, **columns})
+    wheel = {"offset": offset}
+    (curve_,) = scan_from_recordings(
+        [recording(*curve(block, mark(0, 0), mark(300, 1), mark(628, 0), closed=True), wheel=wheel)]
+    ).curves
+    np.testing.assert_allclose(curve_.distance, 0.5 * angle, atol=1e-9)
+    expected = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    np.testing.assert_allclose(curve_.normal, expected, atol=1e-9)
+    timed = Samples(
+        seq=0, curve=0, first_sample=0, time=angle.tolist(), tangent=tangent.tolist(), normal=normal.tolist()
+    )
+    assert scan_from_recordings([recording(*curve(timed), wheel=wheel)]).curves[0].normal.tolist() == normal.tolist()

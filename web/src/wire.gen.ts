@@ -303,6 +303,13 @@ export interface Wheel {
    * m, travelled in one turn
    */
   circumference: number;
+  /**
+   * m along (tangent, normal, B): where it measures, from the point of the surface under the sensors
+   *
+   * @minItems 3
+   * @maxItems 3
+   */
+  offset: [number, number, number];
   ticks_per_turn: number;
 }
 /**

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from platformdirs import user_data_path
-from pydantic import TypeAdapter, ValidationError
+from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from tracemesh.wire.base import Identifier, Name, UnitQuaternion
 from tracemesh.wire.calibration import Calibration
@@ -120,6 +120,10 @@ count = checked(lambda text: _whole(text, 1), "a whole number from 1 up")
 port_number = checked(lambda text: _whole(text, 0, 65535), "a port from 0 to 65535")
 identifier = checked(TypeAdapter(Identifier).validate_python, "up to 64 letters, digits, _ and -")
 name_for_people = checked(TypeAdapter(Name).validate_python, "up to 200 characters, none of them a control character")
+vector = checked(
+    lambda text: TypeAdapter(tuple[FiniteFloat, FiniteFloat, FiniteFloat]).validate_python(text.split(",")),
+    "three numbers separated by commas",
+)
 quaternion = checked(
     lambda text: TypeAdapter(UnitQuaternion).validate_python(text.split(",")),
     "a rotation: four numbers w,x,y,z separated by commas, of length 1",

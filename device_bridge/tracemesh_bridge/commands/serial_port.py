@@ -17,6 +17,7 @@ from tracemesh_bridge.commands.options import (
     name_for_people,
     positive,
     target,
+    vector,
 )
 from tracemesh_bridge.console import Console
 from tracemesh_bridge.doctor import examine
@@ -34,6 +35,10 @@ def add(commands: Commands) -> None:
     option = command.add_argument
     option("--rate", type=positive, default=60.0, help="most samples per second (default %(default)g)")
     option("--circumference", type=positive, default=0.1, help="of the wheel, m (default %(default)g)")
+    option(
+        "--wheel-offset", type=vector, default=(0.0, 0.0, 0.0), metavar="T,N,B",
+        help="m along (tangent, normal, B), of the wheel from the surface under the sensors (default 0,0,0)",
+    )  # fmt: skip
     option("--calibration", type=Path, metavar="CAL.json", help="of this device: have the recording corrected by it")
     command = add_command(
         commands, "calibrate", "find out what a Morphorider's sensors and wheel get wrong", _calibrate
@@ -59,7 +64,8 @@ def add(commands: Commands) -> None:
 
 def _morphorider(args: argparse.Namespace) -> int:
     settings = MorphoriderSettings(args.port, args.rate, args.timeout, layout(args))
-    wheel = Wheel(circumference=args.circumference, ticks_per_turn=settings.layout.ticks_per_turn)
+    ticks = settings.layout.ticks_per_turn
+    wheel = Wheel(circumference=args.circumference, ticks_per_turn=ticks, offset=args.wheel_offset)
     rider = device(args, "morphorider", wheel)
     if args.calibration:
         from tracemesh_bridge.distortion import read_file  # late: it needs the kernel

@@ -10,11 +10,12 @@ from pydantic import ValidationError
 from tracemesh.errors import InputError, ScanError
 from tracemesh.formats.calibrations import calibrate
 from tracemesh.geometry.curves.closed_curves import begun_at_nodes
-from tracemesh.geometry.rotations import normalized, quaternion_to_matrix
+from tracemesh.geometry.rotations import darboux_frames, normalized, quaternion_to_matrix
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 from tracemesh.geometry.sensing.fusion import frames_from_imu
 from tracemesh.geometry.sensing.odometry import distance_from_ticks, distance_from_time
 from tracemesh.geometry.sensing.orientation import ReferenceField, frames_from_quaternions, frames_from_vectors
+from tracemesh.geometry.sensing.wheel_offset import at_wheel
 from tracemesh.geometry.simulated.simulation import (
     COUNTS,
     FULL_SCALE,
@@ -229,11 +230,28 @@ def _curve(raw: _RawCurve, device: Device) -> CurveScan:
     samples, ids = _marks(raw)
     tangent, normal = _orientation(columns, device)
     distance = _distance(columns, device, tangent, normal, samples)
-    return CurveScan(
+    scan = CurveScan(
         distance, tangent, normal, samples, ids, raw.boundary, raw.closed,
         columns.get("acceleration"), columns.get("magnetic"), columns.get("time"),
         timed=columns.keys().isdisjoint({"distance", "ticks"}),
         calibration=right.label,
+    )  # fmt: skip
+    moved = device.wheel is not None and any(device.wheel.offset) and not scan.timed
+    return _at_wheel(scan, device) if moved else scan
+
+
+def _at_wheel(scan: CurveScan, device: Device) -> CurveScan:
+    """The curve as if the sensors were where the wheel touches."""
+    assert device.wheel is not None
+    round_trip = len(scan.node_ids) > 1 and scan.node_ids[0] == scan.node_ids[-1]
+    ends = (scan.node_samples[0], scan.node_samples[-1]) if round_trip else (0, len(scan.distance) - 1)
+    lap = (int(ends[0]), int(ends[1])) if scan.closed else None
+    moved = at_wheel(scan.distance, darboux_frames(scan.tangent, scan.normal), np.array(device.wheel.offset), lap)
+    vectors = (None if v is None else v[moved.nearest] for v in (scan.acceleration, scan.magnetic))
+    acceleration, magnetic = vectors
+    return replace(
+        scan, distance=moved.distance, tangent=moved.frames[:, :, 0].copy(), normal=moved.frames[:, :, 1].copy(),
+        acceleration=acceleration, magnetic=magnetic,
     )  # fmt: skip
 
 

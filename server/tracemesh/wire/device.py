@@ -27,6 +27,10 @@ class Wheel(Message):
 
     circumference: float = Field(default=0.1, gt=0, description="m, travelled in one turn")
     ticks_per_turn: int = Field(default=500, gt=0)
+    offset: Vector = Field(
+        default=(0.0, 0.0, 0.0),
+        description="m along (tangent, normal, B): where it measures, from the point of the surface under the sensors",
+    )
 
 
 class Reference(Message):

@@ -32,7 +32,7 @@ export const morphorider: Source = {
   device: {
     kind: "morphorider",
     name: "Morphorider",
-    wheel: { circumference: CIRCUMFERENCE, ticks_per_turn: TICKS_PER_TURN },
+    wheel: { circumference: CIRCUMFERENCE, ticks_per_turn: TICKS_PER_TURN, offset: [0, 0, 0] },
     mounting: [1, 0, 0, 0],
     reference: REFERENCE,
     calibration: null,
