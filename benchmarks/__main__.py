@@ -6,7 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from time import perf_counter
 
-from benchmarks import accuracy, growth, ingest, lengths, nodes, noisy, regression, surfacing, times
+from benchmarks import accuracy, growth, ingest, lengths, nodes, noisy, regression, service, surfacing, times
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
 from benchmarks.report import read_report, record, write_report
@@ -26,6 +26,9 @@ TABLES: dict[str, Callable[[Data], Table]] = {
     "regression": regression.regression,
     "growth": growth.growth,
     "ingest": ingest.ingest,
+    "requests": service.requests,
+    "jobs": service.jobs,
+    "costs": service.costs,
 }
 
 

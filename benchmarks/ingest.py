@@ -3,16 +3,12 @@
 import asyncio
 import json
 import os
-import socket
 import subprocess
 import sys
 import tempfile
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
-from urllib.error import URLError
-from urllib.request import urlopen
 
 import numpy as np
 import uvloop
@@ -20,6 +16,7 @@ from websockets.asyncio.client import connect as connect_to
 
 from benchmarks.data import Data
 from benchmarks.load import BATCH, PERIOD, RATE, Device, Load, connect, send
+from benchmarks.serving import free_port, memory, processor_time, wait_for_server
 from benchmarks.table import Cell, Column, Table
 
 BEARABLE = 100.0
@@ -80,12 +77,12 @@ def _bearable(row: tuple[Cell, ...]) -> bool:
 def _row(devices: int, seconds: float) -> tuple[Cell, ...]:
     messages = round(seconds / PERIOD) + 1
     with tempfile.TemporaryDirectory() as folder:
-        port = _free_port()
+        port = free_port()
         command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", folder]
         environment = {**os.environ, "TRACEMESH_MAX_DEVICES": "100000"}
         server = subprocess.Popen(command, stderr=subprocess.DEVNULL, env=environment)
         try:
-            _wait_for_server(port)
+            wait_for_server(port)
             seen = uvloop.run(_measure(server.pid, port, devices, messages))
         finally:
             server.terminate()
@@ -104,10 +101,10 @@ async def _measure(server: int, port: int, devices: int, messages: int) -> Seen:
     watching = asyncio.create_task(_watch(connected[0], port, seen.live))
     await asyncio.sleep(SETTLE)
     sampling = asyncio.create_task(_sample_memory(server, PERIOD * messages / 4, seen.memory))
-    busy, start = _processor_time(server), time.perf_counter()
+    busy, start = processor_time(server), time.perf_counter()
     await send(connected, messages)
-    seen.busy, seen.elapsed = _processor_time(server) - busy, time.perf_counter() - start
-    seen.memory.append(_memory(server))
+    seen.busy, seen.elapsed = processor_time(server) - busy, time.perf_counter() - start
+    seen.memory.append(memory(server))
     for task in (watching, sampling):
         task.cancel()
         with suppress(asyncio.CancelledError):
@@ -134,34 +131,4 @@ async def _watch(device: Device, port: int, waits: list[float]) -> None:
 async def _sample_memory(server: int, interval: float, sampled: list[float]) -> None:
     while True:
         await asyncio.sleep(interval)
-        sampled.append(_memory(server))
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-def _wait_for_server(port: int) -> None:
-    deadline = time.monotonic() + 30
-    while True:
-        try:
-            urlopen(f"http://127.0.0.1:{port}/healthz").close()
-            return
-        except URLError:
-            if time.monotonic() > deadline:
-                raise
-            time.sleep(0.05)
-
-
-def _processor_time(pid: int) -> float:
-    """Seconds of processor time of a process (Linux)."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / 100
-
-
-def _memory(pid: int) -> float:
-    """Resident memory of a process, MB (Linux)."""
-    status = Path(f"/proc/{pid}/status").read_text()
-    return int(status.split("VmRSS:")[1].split()[0]) / 1000
+        sampled.append(memory(server))
