@@ -6,7 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from time import perf_counter
 
-from benchmarks import accuracy, growth, ingest, lengths, nodes, noisy, regression, service, surfacing, times
+from benchmarks import accuracy, growth, ingest, lengths, meshes, nodes, noisy, regression, service, surfacing, times
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
 from benchmarks.report import read_report, record, write_report
@@ -14,6 +14,7 @@ from benchmarks.table import Table
 
 TABLES: dict[str, Callable[[Data], Table]] = {
     "surfacing": surfacing.surfacing,
+    "meshes": meshes.meshes,
     "noisy": noisy.noisy,
     "uncertainty": noisy.uncertainty,
     "nodes": nodes.nodes,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import accuracy, growth, lengths, nodes, noisy, regression, surfacing, times
+from benchmarks import accuracy, growth, lengths, meshes, nodes, noisy, regression, surfacing, times
 from benchmarks.data import Data
 from benchmarks.report import read_report, record, write_report
 from benchmarks.table import Column, Table
@@ -137,10 +137,17 @@ def test_times_and_regression() -> None:
 
 
 def test_growth_fits_and_leaves_out_what_takes_too_long() -> None:
-    table = growth.growth(WITHOUT, (300, 600), 60.0)
-    series = ("network", "surface", "surface, refinement off")
+    table = growth.growth(WITHOUT, (300, 600), {"network": 60.0, "surface": 60.0})
+    series = ("network", "surface")
     assert [row[0] for row in table.rows] == [row for name in series for row in (name, name, f"{name}: exponent")]
-    assert [row[2] for row in growth.growth(WITHOUT, (300,), 0.0).rows[:1]] == ["over 0 s"]
+    none = growth.growth(WITHOUT, (300,), {"network": 0.0, "surface": 0.0})
+    assert [row[2] for row in none.rows[:1]] == ["over 0 s"]
+
+
+def test_meshes_of_all_networks_and_scans_are_in_order(shared_data: Path) -> None:
+    rows = meshes.meshes(Data(shared_data)).rows
+    assert len(rows) >= 5 + 10 + 12 + 1
+    assert [row for row in rows if row[-1] != "yes"] == []
 
 
 def test_plain_energy_is_the_solvers_and_has_its_gradient_and_hessian() -> None:

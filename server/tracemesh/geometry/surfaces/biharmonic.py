@@ -26,7 +26,7 @@ class BiharmonicSolver:
 
         pull: (n,) weights of |V - W|^2 with the wanted values W of `solve`, 1/m^2.
         """
-        self._fixed = fixed
+        self._fixed, self.mass = fixed, laplacian.mass
         weight = np.where(open_boundary, 0.0, 1.0 / laplacian.mass)
         self._gradient = (laplacian.stiffness[fixed:] @ sparse.diags(weight)).tocsr()
         matrix = (self._gradient @ laplacian.stiffness).tocsc()

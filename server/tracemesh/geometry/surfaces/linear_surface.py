@@ -31,20 +31,29 @@ def rebuilt_surface(
 
 
 def settled_surface(
-    vertices: Floats, faces: Ints, points: Floats, normals: Floats, lift: Floats
+    vertices: Floats, faces: Ints, normals: Floats, lift: Floats, rebuilds: int = REBUILDS
 ) -> tuple[Floats, Floats]:
     """Rebuilt until it changes little, with its own curvature matched to that of its normals; arguments as above.
 
-    Vertices move along their normals only: sideways nothing holds them, and triangles would drift out of shape.
+    The first vertices, as many as there are normals (fixed, 3), stay. The others move along their normals only:
+    sideways nothing holds them, and triangles would drift out of shape.
     """
-    for _ in range(REBUILDS):
-        laplacian = surface_laplacian(vertices, faces)
-        solver, rebuilt, spread = _solved(laplacian, faces, points, normals, lift)
-        vertices = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
-        vertices[: len(points)] = points
+    points = vertices[: len(normals)]
+    for _ in range(rebuilds - 1):
+        vertices, _, _ = _rebuilt_along_normals(vertices, faces, points, normals, lift)
+    vertices, spread, solver = _rebuilt_along_normals(vertices, faces, points, normals, lift)
     short = _missing_curvature(vertices, faces, spread, len(points))
-    more = solver.solve(np.zeros_like(points), (-2 * short * laplacian.mass)[:, None] * spread)
+    more = solver.solve(np.zeros_like(points), (-2 * short * solver.mass)[:, None] * spread)
     return vertices + (more * spread).sum(1, keepdims=True) * spread, spread
+
+
+def _rebuilt_along_normals(
+    vertices: Floats, faces: Ints, points: Floats, normals: Floats, lift: Floats
+) -> tuple[Floats, Floats, BiharmonicSolver]:
+    """Vertices moved along their normals to where one more solve puts them, the normals, and the solver."""
+    solver, rebuilt, spread = _solved(surface_laplacian(vertices, faces), faces, points, normals, lift)
+    moved = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
+    return np.vstack([points, moved[len(points) :]]), spread, solver
 
 
 def _missing_curvature(vertices: Floats, faces: Ints, normals: Floats, fixed: int) -> Floats:

@@ -7,10 +7,10 @@ from tracemesh.geometry.surfaces.surface_stages import (
     SurfaceParameters,
     SurfaceResult,
     finished,
-    linear_patches,
     prepared,
+    unrolled_patches,
 )
-from tracemesh.geometry.surfaces.two_scales import refined_surface
+from tracemesh.geometry.surfaces.two_scales import solved_surface
 
 __all__ = ["Progress", "SurfaceParameters", "SurfaceResult", "span_surface"]
 
@@ -25,6 +25,6 @@ def span_surface(
     """
     parameters, stages = parameters or SurfaceParameters(), Stages(progress)
     complex_ = prepared(network, parameters, stages)
-    patches, vertices, normals = linear_patches(complex_, parameters, stages)
-    vertices, normals, refinement = refined_surface(complex_, patches, vertices, normals, parameters, stages)
+    patches, flat = unrolled_patches(complex_, parameters, stages)
+    vertices, normals, refinement = solved_surface(complex_, patches, flat, parameters, stages)
     return finished(complex_, patches, vertices, normals, refinement, stages)

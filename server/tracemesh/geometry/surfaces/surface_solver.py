@@ -26,8 +26,9 @@ from tracemesh.geometry.surfaces.surface_stages import (
     finished,
     linear_patches,
     prepared,
+    unrolled_patches,
 )
-from tracemesh.geometry.surfaces.two_scales import LARGEST_REFINED, refined_surface
+from tracemesh.geometry.surfaces.two_scales import LARGEST_REFINED, solved_surface
 
 Mask = NDArray[np.bool_]
 
@@ -69,9 +70,8 @@ class SurfaceSolver:
         changed = np.array([key not in self._known for key in keys])
         if changed.all() or self._whole or complex_.partners or self._parameters.soft is not None:
             changed[:] = True
-            linear = linear_patches(complex_, self._parameters, stages)
-            patches = linear[0]
-            vertices, normals, refinement = refined_surface(complex_, *linear, self._parameters, stages)
+            patches, flat = unrolled_patches(complex_, self._parameters, stages)
+            vertices, normals, refinement = solved_surface(complex_, patches, flat, self._parameters, stages)
             self._refined = bool(refinement["used"])
             self._whole = self._refined and patches.count > LARGEST_REFINED
         else:
@@ -190,4 +190,4 @@ def _refined_again(vertices: Floats, normals: Floats, faces: Ints, patch: Ints, 
 
 
 def _rebuilt_again(vertices: Floats, normals: Floats, faces: Ints, patch: Ints, fixed: int) -> tuple[Floats, Floats]:
-    return settled_surface(vertices, faces, vertices[:fixed], normals[:fixed], np.zeros_like(vertices))
+    return settled_surface(vertices, faces, normals[:fixed], np.zeros_like(vertices))

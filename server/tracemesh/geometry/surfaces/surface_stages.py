@@ -14,7 +14,7 @@ from tracemesh.geometry.surfaces.cell_complex import CellComplex, cell_complex, 
 from tracemesh.geometry.surfaces.curvature import extended_to_boundary, gaussian_curvature, mean_curvature
 from tracemesh.geometry.surfaces.edges import boundary_vertices
 from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian
-from tracemesh.geometry.surfaces.linear_surface import linear_surface, rebuilt_surface, settled_surface
+from tracemesh.geometry.surfaces.linear_surface import REBUILDS, linear_surface, rebuilt_surface, settled_surface
 from tracemesh.geometry.surfaces.patches import PatchMesh, triangulate_patches, unrolled_well
 from tracemesh.geometry.surfaces.quality import inverted_faces, mesh_quality
 from tracemesh.geometry.surfaces.soft_constraints import softened_points
@@ -108,7 +108,13 @@ def finished(
 def linear_patches(
     complex_: CellComplex, parameters: SurfaceParameters, stages: Stages
 ) -> tuple[PatchMesh, Floats, Floats]:
-    """Patches, vertices and normals: over projected patches, then over the same unrolled, then rebuilt."""
+    """Patches, vertices and normals of the linear surface."""
+    patches, flat = unrolled_patches(complex_, parameters, stages)
+    return patches, *settled(complex_, patches, flat, stages)
+
+
+def unrolled_patches(complex_: CellComplex, parameters: SurfaceParameters, stages: Stages) -> tuple[PatchMesh, Floats]:
+    """Patches and vertices: over projected patches, then over the same unrolled."""
     points, normals = complex_.network.points, complex_.network.normals
     last = None
     for attempt in range(LARGEST_UNROLLS + 1):
@@ -124,10 +130,19 @@ def linear_patches(
         last = (patches, vertices)
     if parameters.soft is not None:
         points = _softened(complex_.network, patches, vertices, spread, parameters.soft)
-    stages.begin("rebuild", 0.35)
-    vertices, spread = settled_surface(vertices, patches.faces, points, normals, patches.lift)
+        vertices = np.vstack([points, vertices[len(points) :]])
+    return patches, vertices
+
+
+def settled(
+    complex_: CellComplex, patches: PatchMesh, flat: Floats, stages: Stages, rebuilds: int = REBUILDS
+) -> tuple[Floats, Floats]:
+    """Vertices and normals of the linear surface that a first one leads to. Raises SurfaceError if a patch is lost."""
+    stages.begin("rebuild", 0.6)
+    normals = complex_.network.normals
+    vertices, spread = settled_surface(flat, patches.faces, normals, patches.lift, rebuilds)
     _check_spread(complex_, patches, vertices, spread)
-    return patches, vertices, spread
+    return vertices, spread
 
 
 def _check_spread(complex_: CellComplex, patches: PatchMesh, vertices: Floats, normals: Floats) -> None:

@@ -13,7 +13,7 @@ Rejected: carrying the change of curvature instead of position (networks of many
 solve for a given curvature has an error of its own).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,10 +25,11 @@ from tracemesh.geometry.surfaces.cell_complex import CellComplex
 from tracemesh.geometry.surfaces.curvature import normalised
 from tracemesh.geometry.surfaces.edges import boundary_vertices
 from tracemesh.geometry.surfaces.laplacian import surface_laplacian, triangle_areas
+from tracemesh.geometry.surfaces.linear_surface import REBUILDS
 from tracemesh.geometry.surfaces.patches import PatchMesh
 from tracemesh.geometry.surfaces.refinement import Refined, refine, untrusted
 from tracemesh.geometry.surfaces.subdivision import thinned
-from tracemesh.geometry.surfaces.surface_stages import Stages, SurfaceParameters, linear_patches
+from tracemesh.geometry.surfaces.surface_stages import Stages, SurfaceParameters, linear_patches, settled
 
 COARSE = 1200  # vertices of the thinned network's mesh, about
 COARSE_PER_PATCH = 40  # and not fewer per patch
@@ -37,29 +38,41 @@ LARGEST_REFINED = 5000  # vertices up to which a mesh is also refined itself
 LENGTH = 0.5  # beyond which the coarse surface counts, in its mesh sizes
 
 
-def refined_surface(
-    complex_: CellComplex,
-    patches: PatchMesh,
-    vertices: Floats,
-    normals: Floats,
-    parameters: SurfaceParameters,
-    stages: Stages,
+@dataclass(frozen=True)
+class _Coarse:
+    """Patches over a thinned network and their refined surface."""
+
+    patches: PatchMesh
+    surface: Refined
+
+
+def solved_surface(
+    complex_: CellComplex, patches: PatchMesh, flat: Floats, parameters: SurfaceParameters, stages: Stages
 ) -> tuple[Floats, Floats, dict[str, object]]:
-    """Vertices and normals, refined if that is wanted and convincing, and what the report says about it."""
-    mode = parameters.refinement
+    """Vertices and normals, refined if that is wanted and convincing, and what the report says about it.
+
+    flat: (n, 3) m, vertices of a first surface.
+    """
+    mode, every = parameters.refinement, _thinning(patches)
     report: dict[str, object] = {"mode": mode, "used": False}
     if mode == "off" or patches.count == patches.fixed:
-        return vertices, normals, report
-    stages.begin("refinement", 0.5)
-    every = _thinning(patches)
+        return *settled(complex_, patches, flat, stages), report
     if every == 1:
+        vertices, normals = settled(complex_, patches, flat, stages)
+        stages.begin("refinement", 0.7)
         refined = refine(vertices, normals, patches.faces, patches.patch, patches.fixed)
     else:
+        stages.begin("refinement", 0.5)
         try:
-            refined = _through_coarse(complex_, patches, vertices, normals, parameters, every)
+            coarse = _coarse_surface(complex_, flat[: len(complex_.network.points)], parameters, every)
         except SurfaceError as error:
-            return vertices, normals, report | {"skipped": f"over every {every}th point of the network: {error}"}
-    report |= {"evidence": refined.evidence}
+            reason = f"over every {every}th point of the network, {error}"
+            return *settled(complex_, patches, flat, stages), report | {"skipped": reason}
+        wanted = mode == "on" or coarse.surface.convincing
+        vertices, normals = settled(complex_, patches, flat, stages, REBUILDS - wanted)
+        stages.begin("refinement", 0.7)
+        refined = _following(coarse, patches, vertices, normals) if wanted else coarse.surface
+    report["evidence"] = refined.evidence
     if mode == "auto" and not refined.convincing:
         return vertices, normals, report
     return refined.vertices, refined.normals, report | {"used": True}
@@ -73,30 +86,26 @@ def _thinning(patches: PatchMesh) -> int:
     return max(1, round(float(np.sqrt(patches.count / wanted))))
 
 
-def _through_coarse(
-    complex_: CellComplex,
-    patches: PatchMesh,
-    vertices: Floats,
-    normals: Floats,
-    parameters: SurfaceParameters,
-    every: int,
-) -> Refined:
-    """The surface that a refined one over every k-th point of the network leads to, and the evidence for that one."""
-    network = thinned(replace(complex_.network, points=vertices[: len(complex_.network.points)]), every)
+def _coarse_surface(complex_: CellComplex, points: Floats, parameters: SurfaceParameters, every: int) -> _Coarse:
+    """The refined surface over every k-th point of a network with other positions (k, 3)."""
+    network = thinned(replace(complex_.network, points=points), every)
     size = None if parameters.mesh_size is None else every * parameters.mesh_size
-    mesh, points, facing = linear_patches(complex_.resampled(network), SurfaceParameters(size), Stages(None))
-    coarse = refine(points, facing, mesh.faces, mesh.patch, mesh.fixed)
-    if not coarse.convincing and parameters.refinement == "auto":
-        return Refined(vertices, normals, coarse.evidence)
-    towards = _sampled(coarse, mesh, patches, vertices, normals)
-    length = LENGTH * float(np.sqrt(triangle_areas(coarse.vertices[mesh.faces]).mean() * 4 / np.sqrt(3)))
+    patches, *linear = linear_patches(complex_.resampled(network), SurfaceParameters(size), Stages(None))
+    return _Coarse(patches, refine(linear[0], linear[1], patches.faces, patches.patch, patches.fixed))
+
+
+def _following(coarse: _Coarse, patches: PatchMesh, vertices: Floats, normals: Floats) -> Refined:
+    """A surface that follows the coarse one, refined itself if it is not too large."""
+    mesh, surface = coarse.patches, coarse.surface
+    towards = _sampled(surface, mesh, patches, vertices, normals)
+    length = LENGTH * float(np.sqrt(triangle_areas(surface.vertices[mesh.faces]).mean() * 4 / np.sqrt(3)))
     moved, turned = _blended(patches, vertices, normals, towards, length)
     kept = untrusted(patches.faces, patches.patch, (vertices, normals), (moved, turned))[:, None]
     moved, turned = np.where(kept, vertices, moved), np.where(kept, normals, turned)
-    if patches.count <= LARGEST_REFINED:
-        fine = refine(moved, turned, patches.faces, patches.patch, patches.fixed)
-        moved, turned = fine.vertices, fine.normals
-    return Refined(moved, turned, coarse.evidence)
+    if patches.count > LARGEST_REFINED:
+        return Refined(moved, turned, surface.evidence)
+    fine = refine(moved, turned, patches.faces, patches.patch, patches.fixed)
+    return Refined(fine.vertices, fine.normals, surface.evidence)
 
 
 def _sampled(
