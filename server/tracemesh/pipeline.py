@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from time import perf_counter
 
+import numpy as np
+
 from tracemesh.errors import PiecesError, ScanError
 from tracemesh.formats.meshes import write_mesh
 from tracemesh.formats.networks import write_network
@@ -27,6 +29,8 @@ NETWORK_SHARE = 0.3
 """Part of the whole work, as the progress bar shows it, that the network takes."""
 LEAST_CONFIDENCE = 0.5
 """A node that was found rather than marked is used where it is likelier than not."""
+MOST_DIVISIONS = 3000
+"""Vertices along a network's diagonal: more would make a mesh of many million."""
 SOFT_LENGTH = 2.0
 """Edge lengths over which a soft surface smooths its network."""
 
@@ -85,8 +89,8 @@ def reconstruct(
     nodes = {"nodes": _nodes_report(found)} if found else {}
     result = Reconstruction(curves.network, None, {**made, **nodes, "network": curves.report}, found)
     if parameters.surface:
-        soft = SOFT_LENGTH if parameters.soft else None
-        result = _with_surface(result, SurfaceParameters(soft=soft), _part(report, NETWORK_SHARE, 1.0))
+        surface = SurfaceParameters(_mesh_size(parameters, result.network), SOFT_LENGTH if parameters.soft else None)
+        result = _with_surface(result, surface, _part(report, NETWORK_SHARE, 1.0))
     result.report["seconds"] = perf_counter() - begin
     report("done", 1.0)
     return result
@@ -153,24 +157,27 @@ def _network(scan: Scan, parameters: ReconstructionParameters, progress: Progres
         raise PiecesError(f"{error}; {hint}") from None
 
 
-def span(network: CurveNetwork, progress: Progress | None = None, step: float | None = None) -> Reconstruction:
+def span(
+    network: CurveNetwork,
+    progress: Progress | None = None,
+    step: float | None = None,
+    parameters: ReconstructionParameters | None = None,
+) -> Reconstruction:
     """Surface over a network that is known already; raises NetworkError or SurfaceError.
 
     step: m between points that the network's curves get first; None leaves its points as they are.
     """
     begin = perf_counter()
     network = network if step is None else resample_network(network, step)
-    result = _with_surface(
-        Reconstruction(network, None, {"generator": _generator()}), SurfaceParameters(), progress or _silent
-    )
+    surface = SurfaceParameters(_mesh_size(parameters or ReconstructionParameters(), network))
+    result = _with_surface(Reconstruction(network, None, {"generator": _generator()}), surface, progress or _silent)
     result.report["seconds"] = perf_counter() - begin
     return result
 
 
 def network_parameters(parameters: ReconstructionParameters) -> NetworkParameters:
     """The kernel's parameters for what a person chose."""
-    relative = parameters.step.endswith("%")
-    number = float(parameters.step.rstrip("%"))
+    number, relative = _number(parameters.step)
     return NetworkParameters(
         step=None if relative else number,
         step_fraction=number / 100 if relative else NetworkParameters.step_fraction,
@@ -179,6 +186,22 @@ def network_parameters(parameters: ReconstructionParameters) -> NetworkParameter
         weights=parameters.weights,
         curve_bias=parameters.curve_bias,
     )
+
+
+def _mesh_size(parameters: ReconstructionParameters, network: CurveNetwork) -> float | None:
+    if parameters.mesh_size is None:
+        return None
+    number, relative = _number(parameters.mesh_size)
+    diagonal = float(np.linalg.norm(np.ptp(network.points, axis=0)))
+    size = number / 100 * diagonal if relative else number
+    if not size * MOST_DIVISIONS >= diagonal:
+        raise ScanError(f"wanted a mesh size of at least {diagonal / MOST_DIVISIONS:.3g} m, got {size:.3g} m")
+    return size
+
+
+def _number(text: str) -> tuple[float, bool]:
+    """A length and whether it is in % of a diagonal rather than in m."""
+    return float(text.rstrip("%")), text.endswith("%")
 
 
 def _with_surface(before: Reconstruction, parameters: SurfaceParameters, progress: Progress) -> Reconstruction:

@@ -68,8 +68,8 @@ def without_unused_points(network: dict[str, Any]) -> dict[str, Any]:
     return {**network, **kept, "nodes": [number[p] for p in network["nodes"]]}
 
 
-def test_an_uneven_network_is_resampled_first(lilium: Path, shared_data: Path, tmp_path: Path) -> None:
-    """Of the network's points between nodes one in three is kept; splines give back what the surface needs."""
+def test_an_uneven_network_is_resampled_first(lilium: Path, tmp_path: Path) -> None:
+    """Of the network's points between nodes one in three is kept; splines give back the surface of all of them."""
     network = json.loads((lilium / "network.json").read_text())
     for segment in network["segments"]:
         points = segment["points"]
@@ -80,8 +80,8 @@ def test_an_uneven_network_is_resampled_first(lilium: Path, shared_data: Path, t
     for name, options in (("as-is.obj", ()), ("even.obj", ("--resample", 0.015))):
         done = tracemesh("surface", uneven, "-o", tmp_path / name, *options)
         assert done.returncode == 0, done.stderr
-        truth = ("--truth", shared_data / "lilium.obj", "--align", "rigid", "--json")
-        errors.append(json.loads(tracemesh("evaluate", tmp_path / name, *truth).stdout)["mean"])
+        whole = ("--truth", lilium / "lilium.glb", "--json")
+        errors.append(json.loads(tracemesh("evaluate", tmp_path / name, *whole).stdout)["mean"])
     assert errors[1] < errors[0]
 
 
@@ -187,3 +187,21 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert "none.rawnet" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_mesh_size_is_chosen_apart_from_the_step(lilium: Path, tmp_path: Path) -> None:
+    network, mesh = lilium / "network.json", tmp_path / "mesh.ply"
+    edges = []
+    for size in ("3%", "0.8%"):
+        done = tracemesh("surface", network, "-o", mesh, "--mesh-size", size)
+        assert done.returncode == 0, done.stderr
+        found = trimesh.load_mesh(mesh)
+        diagonal = np.linalg.norm(np.ptp(json.loads(network.read_text())["points"], axis=0))
+        edges.append(np.median(found.edges_unique_length) / diagonal)
+        assert found.euler_number == 1
+    assert edges[1] == pytest.approx(0.008, rel=0.4)
+    assert edges[0] > 1.5 * edges[1]
+    for wrong, status, words in (("0.0001%", 1, "mesh size of at least"), ("fine", 2, "such as 0.8% or")):
+        done = tracemesh("surface", network, "-o", tmp_path / "none.ply", "--mesh-size", wrong)
+        assert (done.returncode, words in done.stderr) == (status, True), done.stderr
+    assert not (tmp_path / "none.ply").exists()

@@ -510,6 +510,10 @@ export interface ReconstructionParameters {
    */
   infer_nodes: boolean;
   /**
+   * distance of the surface's vertices: % of the network's diagonal, or m; none: as its points
+   */
+  mesh_size: string | null;
+  /**
    * let the surface leave a noisy network a little
    */
   soft: boolean;
@@ -637,6 +641,10 @@ export interface PreviewWish {
    * tried out instead of the marks that these curves have
    */
   marks: CurveMarks[];
+  /**
+   * distance of the surface's vertices: % of the network's diagonal, or m; none: as its points
+   */
+  mesh_size: string | null;
   /**
    * let the surface leave a noisy network a little
    */

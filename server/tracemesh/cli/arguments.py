@@ -56,6 +56,10 @@ def _between(number: Number, least: float, most: float = math.inf) -> Number:
 step = checked(
     lambda text: ReconstructionParameters(step=text).step, "a percentage such as 1.6% or metres such as 0.01"
 )
+mesh_size = checked(
+    lambda text: ReconstructionParameters(mesh_size=text).mesh_size,
+    "a percentage such as 0.8% or metres such as 0.005",
+)
 place = checked(_two_numbers, "latitude and longitude in degrees, such as 45.2,5.7")
 length = checked(_measured_length, "CURVE:SEGMENT=METRES, both counted from 1, such as 1:2=0.35")
 iso_date = checked(date.fromisoformat, "a date such as 2026-11-22")

@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracemesh.cli.arguments import Commands, iso_date, length, mesh_path, place, step
+from tracemesh.cli.arguments import Commands, iso_date, length, mesh_path, mesh_size, place, step
 from tracemesh.errors import InputError
 from tracemesh.files import check_writable, read_text, write_all
 from tracemesh.terminal import ProgressLine
@@ -35,6 +35,7 @@ def add_reconstruct(commands: Commands) -> None:
     parser.add_argument(
         "--step", type=step, default="1.6%", help="distance of points: %% of the diagonal, or m (default 1.6%%)"
     )
+    _add_mesh_size(parser)
     parser.add_argument("--stretch", type=float, metavar="L2", help="smoothing length of the stretch term, m (auto)")
     parser.add_argument("--bend", type=float, metavar="L4", help="smoothing length of the bend term, m (auto)")
     parser.add_argument("--weights", choices=("auto", "thesis"), default="auto", help="smoothing (default auto)")
@@ -80,7 +81,16 @@ def add_surface(commands: Commands) -> None:
         metavar="STEP",
         help="first space the points of every curve evenly, about STEP m apart",
     )
+    _add_mesh_size(parser)
     parser.set_defaults(command=_surface)
+
+
+def _add_mesh_size(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--mesh-size",
+        type=mesh_size,
+        help="distance of the surface's vertices: %% of the network's diagonal, or m (default: as its points)",
+    )
 
 
 def _add_mesh_output(parser: argparse.ArgumentParser) -> None:
@@ -101,6 +111,7 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
 
     parameters = ReconstructionParameters(
         step=chosen.step,
+        mesh_size=chosen.mesh_size,
         stretch=chosen.stretch,
         bend=chosen.bend,
         weights=chosen.weights,
@@ -156,7 +167,7 @@ def _surface(chosen: argparse.Namespace) -> int:
     check_writable(chosen.output, chosen.report)
     network = read_network(read_text(chosen.input), chosen.input)
     with ProgressLine() as progress:
-        result = span(network, progress, chosen.resample)
+        result = span(network, progress, chosen.resample, ReconstructionParameters(mesh_size=chosen.mesh_size))
     _write_results(chosen, result)
     return 0
 

@@ -9,6 +9,8 @@ from tracemesh.wire.base import Count, Identifier, Message, Name, Vector
 from tracemesh.wire.calibration import Version
 from tracemesh.wire.device import Device
 
+PERCENT_OR_METRES = r"^\d+(\.\d+)?(e-?\d+)?%?$"
+
 
 class SessionCreate(Message):
     """POST /sessions."""
@@ -153,8 +155,13 @@ class ReconstructionParameters(Message):
 
     step: str = Field(
         default="1.6%",
-        pattern=r"^\d+(\.\d+)?(e-?\d+)?%?$",
+        pattern=PERCENT_OR_METRES,
         description="distance of the network's points: % of the estimated diagonal, or m",
+    )
+    mesh_size: str | None = Field(
+        default=None,
+        pattern=PERCENT_OR_METRES,
+        description="distance of the surface's vertices: % of the network's diagonal, or m; none: as its points",
     )
     stretch: float | None = Field(default=None, ge=0, description="smoothing length of the stretch term, m")
     bend: float | None = Field(default=None, ge=0, description="smoothing length of the bend term, m")
