@@ -39,6 +39,10 @@ class Settings(BaseSettings):
         default="", description="s3://bucket/prefix for meshes and reports; empty: a folder in the data folder"
     )
     token: SecretStr | None = Field(default=None, description=f"token of the owner, {MIN_TOKEN} characters or more")
+    trusted_proxies: str = Field(
+        default="",
+        description="addresses or networks of reverse proxies, with commas; their X-Forwarded-... is believed",
+    )
     executor: str = Field(
         default="embedded", description="where jobs run: embedded, in processes of the server, or dask://HOST:PORT"
     )

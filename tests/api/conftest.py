@@ -17,8 +17,7 @@ import pytest
 import uvicorn
 from websockets.sync.client import ClientConnection, connect
 
-from tracemesh.api.app import create_app
-from tracemesh.api.websocket import SteadyReading
+from tracemesh.api.server import configure
 from tracemesh.settings import Settings
 
 
@@ -95,10 +94,7 @@ def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[
 
     def start(**options: Any) -> RunningServer:
         settings = Settings(**{"data_dir": tmp_path_factory.mktemp("data"), "port": free_port(), **options})
-        config = uvicorn.Config(
-            create_app(settings), port=settings.port, log_level="warning", ws=SteadyReading, lifespan="on"
-        )
-        server = uvicorn.Server(config)
+        server = uvicorn.Server(configure(settings))
         thread = threading.Thread(target=server.run)
         thread.start()
         while not server.started:

@@ -106,3 +106,20 @@ def test_a_name_that_somebody_else_gave_to_this_machine_is_not_answered(server: 
         assert server.http.get("/sessions", headers={"Host": host}).status_code == 403
     for host in ("localhost", f"localhost:{server.port}", "[::1]:8000"):
         assert server.http.get("/sessions", headers={"Host": host}).status_code == 200
+
+
+FORWARDED = {"X-Forwarded-Proto": "https", "X-Forwarded-For": "203.0.113.7"}
+
+
+@pytest.mark.parametrize(("trusted", "secure"), [("127.0.0.0/8", True), ("203.0.113.9", False), ("", False)])
+def test_a_proxys_word_counts_only_when_it_is_trusted(
+    start_server: Callable[..., Any], trusted: str, secure: bool
+) -> None:
+    server = start_server(token=TOKEN, trusted_proxies=trusted)
+    with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", headers=FORWARDED) as behind:
+        assert ("Secure" in behind.get("/", params={"token": TOKEN}).headers["set-cookie"]) == secure
+        wrong = {"Authorization": "Bearer wrong"}
+        while behind.get("/api/v1/rights", headers=wrong).status_code != 429:
+            pass
+    other = httpx.get(f"http://127.0.0.1:{server.port}/api/v1/rights", headers=wrong)
+    assert (other.status_code == 401) == secure, "limits count the client, not the proxy"

@@ -17,6 +17,7 @@ from tracemesh.api.access.tokens import Tokens
 from tracemesh.api.comparing import Comparer
 from tracemesh.api.compression import WeakTags
 from tracemesh.api.errors import install_handlers
+from tracemesh.api.limits import BodyLimits
 from tracemesh.api.live.hub import Hub
 from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
@@ -70,6 +71,7 @@ def create_app(settings: Settings) -> FastAPI:
         swagger_ui_oauth2_redirect_url=None,
         middleware=[
             Middleware(Gate, settings=settings),
+            Middleware(BodyLimits),
             Middleware(WeakTags),
             Middleware(GZipMiddleware, compresslevel=4),
         ],

@@ -8,6 +8,7 @@ import socket
 import uvicorn
 
 from tracemesh.api.app import create_app
+from tracemesh.api.limits import PatientHttp
 from tracemesh.api.websocket import SteadyReading
 from tracemesh.api.welcome import greet
 from tracemesh.errors import ResourceError
@@ -19,6 +20,8 @@ MAX_MESSAGE = 4 * 2**20
 """Most bytes of one message on a socket."""
 DRAIN = 5
 """s that open requests have to end when the server stops."""
+MAX_CLIENTS = 1000
+"""Connections besides those of devices."""
 COLLECT_AFTER = (50_000, 20, 100)
 """New objects until the garbage collector looks through the youngest; how often it does before it looks further."""
 
@@ -31,23 +34,31 @@ def serve(settings: Settings) -> None:
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
     _prepare(settings)
-    configuration = uvicorn.Config(
+    _collect_garbage_seldom()
+    try:
+        _Server(configure(settings), settings).run()
+    except SystemExit:  # uvicorn's word for an address that it could not have; its log says why
+        raise ResourceError(f"cannot listen at {settings.host}:{settings.port}") from None
+
+
+def configure(settings: Settings) -> uvicorn.Config:
+    """How uvicorn is to serve the application."""
+    return uvicorn.Config(
         create_app(settings),
         host=settings.host,
         port=settings.port,
+        lifespan="on",
+        http=PatientHttp,
         ws=SteadyReading,
         ws_max_size=MAX_MESSAGE,
         ws_per_message_deflate=False,
+        limit_concurrency=settings.max_devices + MAX_CLIENTS,
+        forwarded_allow_ips=settings.trusted_proxies or [],
         timeout_graceful_shutdown=DRAIN,
         access_log=False,
         log_config=None,
         server_header=False,
     )
-    _collect_garbage_seldom()
-    try:
-        _Server(configuration, settings).run()
-    except SystemExit:  # uvicorn's word for an address that it could not have; its log says why
-        raise ResourceError(f"cannot listen at {settings.host}:{settings.port}") from None
 
 
 def _collect_garbage_seldom() -> None:

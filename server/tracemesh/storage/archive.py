@@ -3,7 +3,10 @@
 A zip of `session.json` (the manifest), `recordings/NAME.ndjson` and `artifacts/DIGEST`.
 """
 
+import lzma
+import struct
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from datetime import datetime
 from hashlib import sha256
@@ -25,6 +28,20 @@ from tracemesh.wire.calibration import Calibration
 from tracemesh.wire.resources import Mark, ReconstructionParameters
 
 MANIFEST = "session.json"
+DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    KeyError,
+    NotImplementedError,
+    OSError,
+    OverflowError,
+    RuntimeError,
+    ValueError,
+)
+"""What zipfile raises for files that are none, or are damaged."""
 
 
 class ArchivedCurve(Message):
@@ -83,11 +100,11 @@ def read_archive(file: IO[bytes], max_bytes: int) -> tuple[Manifest, dict[str, b
                 raise InputError(f"wanted an archive of at most {max_bytes} bytes when unpacked")
             manifest = Manifest.model_validate_json(archive.read(MANIFEST))
             contents = {name: archive.read(name) for name in manifest.files}
-    except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError) as error:  # as zipfile raises them
-        raise InputError(f"wanted an archive of a session: {error}") from None
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(f"{MANIFEST}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    except DAMAGED as error:
+        raise InputError(f"wanted an archive of a session: {error}") from None
     for name, content in contents.items():
         if sha256(content).hexdigest() != manifest.files[name]:
             raise InputError(f"{name}: its content is not what was archived")
