@@ -15,6 +15,9 @@ TracemeshError
     └── Refused           a device's message that is not taken: carries the code that the protocol has for it
 """
 
+MENDS = ("boundary", "interior", "open", "remove", "nodes")
+"""What may be done to a curve: mark it as boundary, as interior or as open, leave it out, find its nodes."""
+
 
 class TracemeshError(Exception):
     """Base of all errors whose message is meant for the person in front of the screen."""
@@ -26,6 +29,12 @@ class InputError(TracemeshError):
 
 class ScanError(TracemeshError):
     """A scan from which no network can be reconstructed; the message names the curve and the reason."""
+
+    def __init__(self, message: str, curves: tuple[int, ...] = (), mend: str | None = None) -> None:
+        """curves: those that it is about, counted from 0; mend: what would mend it, if that is one of MENDS."""
+        super().__init__(message)
+        self.curves = curves
+        self.mend = mend
 
 
 class PiecesError(ScanError):

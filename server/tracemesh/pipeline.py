@@ -154,7 +154,7 @@ def _network(scan: Scan, parameters: ReconstructionParameters, progress: Progres
             hint = f"even with the nodes that were found with a confidence over {LEAST_CONFIDENCE}: mark more of them"
         else:
             hint = "mark where they meet, or have the nodes found (--infer-nodes)"
-        raise PiecesError(f"{error}; {hint}") from None
+        raise PiecesError(f"{error}; {hint}", error.curves, error.mend) from None
 
 
 def span(

@@ -23,6 +23,7 @@ VIEWER = {
     ("GET", "/api/v1/sessions/{session}"),
     ("GET", "/api/v1/sessions/{session}/archive"),
     ("GET", "/api/v1/sessions/{session}/outline"),
+    ("GET", "/api/v1/sessions/{session}/problems"),
     ("GET", "/api/v1/sessions/{session}/scan.rawnet"),
     ("GET", "/api/v1/sessions/{session}/curves"),
     ("GET", "/api/v1/sessions/{session}/curves/{index}"),

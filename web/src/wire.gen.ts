@@ -198,6 +198,31 @@ export interface Mark {
   sample: number;
 }
 /**
+ * A change of one curve, to be made with PATCH.
+ */
+export interface CurveEdit {
+  change: CurveUpdate;
+  /**
+   * index within the session
+   */
+  curve: number;
+}
+/**
+ * PATCH /sessions/{session}/curves/{index}; absent fields stay.
+ */
+export interface CurveUpdate {
+  boundary: boolean | null;
+  closed: boolean | null;
+  /**
+   * replace all marks of the curve
+   */
+  marks: Mark[] | null;
+  /**
+   * left out of everything; its samples stay stored
+   */
+  removed: boolean | null;
+}
+/**
  * A curve ends.
  */
 export interface CurveEnd {
@@ -237,21 +262,6 @@ export interface CurveStart {
   curve: number;
   seq: number;
   type: "curve.start";
-}
-/**
- * PATCH /sessions/{session}/curves/{index}; absent fields stay.
- */
-export interface CurveUpdate {
-  boundary: boolean | null;
-  closed: boolean | null;
-  /**
-   * replace all marks of the curve
-   */
-  marks: Mark[] | null;
-  /**
-   * left out of everything; its samples stay stored
-   */
-  removed: boolean | null;
 }
 /**
  * Who measures, and what is needed to read its numbers.
@@ -323,6 +333,19 @@ export interface ErrorMessage {
   expected_seq: number | null;
   message: string;
   type: "error";
+}
+/**
+ * What would mend a problem.
+ */
+export interface Fix {
+  /**
+   * none: look for nodes that nobody marked
+   */
+  changes: CurveEdit[];
+  /**
+   * in words, for a button
+   */
+  label: string;
 }
 /**
  * First message of every connection and first line of every recording.
@@ -530,6 +553,28 @@ export interface ReconstructionParameters {
    */
   surface: boolean;
   weights: "auto" | "thesis";
+}
+/**
+ * What keeps a session's curves from being a network with a surface, or what a person should know of it.
+ */
+export interface NetworkProblem {
+  /**
+   * indices of the curves that it is about
+   */
+  curves: number[];
+  fix: Fix | null;
+  message: string;
+  /**
+   * from where to where on the first of them
+   */
+  samples: [number, number] | null;
+  severity: "error" | "warning";
+}
+/**
+ * GET /sessions/{session}/problems.
+ */
+export interface NetworkProblems {
+  problems: NetworkProblem[];
 }
 /**
  * A token that was just made; nobody is told its secret again.

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from tracemesh.api.live.drawing import flat
-from tracemesh.errors import Conflict, InputError, TracemeshError
+from tracemesh.errors import Conflict, InputError, ScanError, TracemeshError
 from tracemesh.formats.rawnet import write_rawnet
 from tracemesh.formats.recordings import with_marks
 from tracemesh.geometry.curves.closed_curves import begun_at_nodes
 from tracemesh.geometry.scan import Floats, Scan
 from tracemesh.jobs.attached import SolvedNetwork
+from tracemesh.jobs.problems import find_problems
 from tracemesh.jobs.proposals import propose_nodes
 from tracemesh.jobs.slot import Slot
 from tracemesh.storage.curves import list_curves
@@ -21,7 +22,15 @@ from tracemesh.storage.database import Database
 from tracemesh.storage.models import new_id
 from tracemesh.storage.scans import load_sent
 from tracemesh.wire.live import LiveCurve, Preview
-from tracemesh.wire.resources import Curve, CurveMarks, NodePosition, NodeProposals, PreviewWish
+from tracemesh.wire.resources import (
+    Curve,
+    CurveMarks,
+    NetworkProblem,
+    NetworkProblems,
+    NodePosition,
+    NodeProposals,
+    PreviewWish,
+)
 
 MAX_SCANS = 8
 """Sessions whose scan is kept in memory."""
@@ -89,6 +98,17 @@ class Previewer:
         """The session's scan as a rawnet; raises NotFound and ScanError."""
         loaded = await self._scan(session)
         return await asyncio.to_thread(write_rawnet, begun_at_nodes(loaded.scan))
+
+    async def problems(self, session: str) -> NetworkProblems:
+        """What keeps a session's curves from becoming a surface; raises NotFound."""
+        try:
+            loaded = await self._scan(session)
+        except ScanError as error:
+            return NetworkProblems(problems=[NetworkProblem(message=str(error), severity="error")])
+        by_index = {curve.index: curve for curve in loaded.curves}
+        async with self._turn:
+            found = await self._run(find_problems, loaded.scan, [by_index[i] for i in loaded.indices])
+        return NetworkProblems(problems=found)
 
     async def _run(self, function: Callable[..., T], *arguments: object) -> T:
         try:

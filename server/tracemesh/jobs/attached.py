@@ -39,6 +39,7 @@ class SolvedNetwork:
     curves: dict[int, SolvedCurve]
     nodes: dict[int, Floats]
     report: dict[str, object]
+    network: CurveNetwork
 
 
 def solve_attached(database_url: str, session: str) -> SolvedNetwork | None:
@@ -90,7 +91,7 @@ def solved_network(scan: Scan, begun: Scan, indices: Sequence[int], result: "Net
         for i, (index, curve, sent) in enumerate(zip(indices, begun.curves, scan.curves, strict=True))
     }
     nodes = {int(n): network.points[p] for n, p in zip(numbers, network.nodes, strict=False)}
-    return SolvedNetwork(curves, nodes, result.report)
+    return SolvedNetwork(curves, nodes, result.report, network)
 
 
 def _solved(network: CurveNetwork, index: int, curve: CurveScan, sent: CurveScan) -> SolvedCurve:

@@ -174,6 +174,36 @@ class ReconstructionParameters(Message):
     surface: bool = Field(default=True, description="also span the surface, not only the network")
 
 
+class CurveEdit(Message):
+    """A change of one curve, to be made with PATCH."""
+
+    curve: Count = Field(description="index within the session")
+    change: CurveUpdate
+
+
+class Fix(Message):
+    """What would mend a problem."""
+
+    label: str = Field(description="in words, for a button")
+    changes: list[CurveEdit] = Field(default=[], description="none: look for nodes that nobody marked")
+
+
+class NetworkProblem(Message):
+    """What keeps a session's curves from being a network with a surface, or what a person should know of it."""
+
+    message: str
+    severity: Literal["error", "warning"]
+    curves: list[Count] = Field(default=[], description="indices of the curves that it is about")
+    samples: tuple[Count, Count] | None = Field(default=None, description="from where to where on the first of them")
+    fix: Fix | None = None
+
+
+class NetworkProblems(Message):
+    """GET /sessions/{session}/problems."""
+
+    problems: list[NetworkProblem]
+
+
 class CurveMarks(Message):
     """Marks of one curve."""
 

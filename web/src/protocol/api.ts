@@ -4,6 +4,7 @@ import type {
   ComparisonProgress,
   Curve,
   CurveUpdate,
+  NetworkProblems,
   NodeProposals,
   Outline,
   Preview,
@@ -99,6 +100,10 @@ export class Api {
 
   proposals(session: string): Promise<NodeProposals> {
     return this.#json<NodeProposals>("GET", `/sessions/${session}/node-proposals`);
+  }
+
+  problems(session: string): Promise<NetworkProblems> {
+    return this.#json<NetworkProblems>("GET", `/sessions/${session}/problems`);
   }
 
   reconstruction(id: string): Promise<Reconstruction> {

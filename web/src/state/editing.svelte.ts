@@ -1,5 +1,5 @@
 import { polylineLength, type Vector } from "../geometry/vectors";
-import type { Curve, CurveMarks, Mark, NodeProposal, NodeProposals } from "../wire.gen";
+import type { Curve, CurveMarks, CurveUpdate, Mark, NetworkProblem, NodeProposal, NodeProposals } from "../wire.gen";
 import type { Command } from "./history.svelte";
 import { type MarkPlace, marksChanged, marksWith, newNode, placesOf, roomFor, sameMarks, unmarked } from "./marks";
 import type { Network } from "./network";
@@ -140,6 +140,17 @@ export class EditStore {
     await this.store.command(() => this.store.history.do({ label, run: () => set(value), revert: () => set(!value) }));
   }
 
+  /** Do what the server proposes to mend a problem. */
+  async mend({ fix }: NetworkProblem): Promise<void> {
+    if (!fix) return;
+    if (!fix.changes.length) return this.findNodes();
+    const changes = fix.changes.map(({ curve, change }) => ({ index: curve, change: given(change) }));
+    const before = changes.map(({ index, change }) => ({ index, change: this.#asItIs(index, change) }));
+    const { store } = this;
+    const command = { label: fix.label, run: () => store.write(changes), revert: () => store.write(before) };
+    await store.command(() => store.history.do(command));
+  }
+
   /** Mark a node, a new one unless its number is given. */
   async addMark(place: MarkPlace, node?: number): Promise<void> {
     const number = (curves: readonly Curve[]): number => node ?? newNode(curves);
@@ -223,6 +234,12 @@ export class EditStore {
     if (proposals) this.proposals = { ...proposals, proposals: proposals.proposals.filter((p) => p !== proposal) };
   }
 
+  /** What a curve has now of what a change changes. */
+  #asItIs(index: number, change: Partial<CurveUpdate>): Partial<CurveUpdate> {
+    const now: Partial<CurveUpdate> = { removed: false, ...this.store.detailsOf(index) };
+    return Object.fromEntries(Object.keys(change).map((name) => [name, now[name as keyof CurveUpdate]]));
+  }
+
   #markable(place: Place, eye: Eye): CurvePlace | undefined {
     const { network } = this.store;
     return eye.nodeAt(place, network) === undefined ? eye.curveAt(place, network, REACH) : undefined;
@@ -295,6 +312,11 @@ export function placeOn(network: Network, curve: number, point: number): CurvePl
 export function lengthUpTo(network: Network, place: CurvePlace): number {
   const points = network.curves.get(place.curve)?.points;
   return points ? polylineLength(points.coordinates.subarray(0, 3 * place.point + 3)) : 0;
+}
+
+/** What a change changes; the server sends the rest as null. */
+function given(change: CurveUpdate): Partial<CurveUpdate> {
+  return Object.fromEntries(Object.entries(change).filter(([, value]) => value !== null));
 }
 
 function nearest(places: readonly MarkPlace[], sample: number): MarkPlace | undefined {

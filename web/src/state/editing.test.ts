@@ -114,6 +114,22 @@ it("does the same by key", async () => {
   expect(marked(0)).toBe("0@0 1@50 2@90");
 });
 
+it("does what mends a problem and takes it back", async () => {
+  const { edit, marked, store } = setup();
+  const nothing = { boundary: null, closed: null, removed: null, marks: null };
+  const marks = [{ sample: 7, node: 3 }];
+  const changes = [
+    { curve: 1, change: { ...nothing, marks } },
+    { curve: 0, change: { ...nothing, boundary: true } },
+  ];
+  const fix = { label: "Join", changes };
+  Object.assign(store.details[0] ?? {}, { boundary: false });
+  await edit.mend({ message: "", severity: "error", curves: [1], samples: null, fix });
+  expect([marked(1), store.details[0]?.boundary, store.history.last?.label]).toEqual(["3@7", true, "Join"]);
+  await store.history.undo();
+  expect([marked(1), store.details[0]?.boundary]).toEqual(["3@20", false]);
+});
+
 it("measures along the curve as drawn", () => {
   const { store } = setup();
   const place = placeOn(store.network, 0, 7) as CurvePlace;

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { ToBrowser } from "../protocol/messages";
-import { Network, Points } from "./network";
+import { type DrawnCurve, Network, Points, stretchOf } from "./network";
 
 const start = (index: number, boundary = false): ToBrowser => ({ type: "live.curve.start", index, boundary });
 const points = (index: number, first: number, positions: number[]): ToBrowser => ({
@@ -66,4 +66,12 @@ describe("Network", () => {
     expect([...network.nodes.keys()]).toEqual([0]);
     expect(network.apply(points(1, 1, [4, 5, 6]))).toBe("grown");
   });
+});
+
+it("finds the stretch of a curve between two samples, also over its end", () => {
+  const positions = [0, 1, 2, 3, 4].flatMap((x) => [x, 0, 0]);
+  const curve = { points: new Points(positions, [30, 40, 0, 10, 20]) } as DrawnCurve;
+  const xs = (samples: [number, number] | null): number[] => stretchOf(curve, samples).filter((_, i) => i % 3 === 0);
+  expect([xs([10, 30]), xs([35, 5]), xs([20, 20]), xs(null)]).toEqual([[0, 3, 4], [1, 2], [4], [0, 1, 2, 3, 4]]);
+  expect(stretchOf({ points: new Points([1, 2, 3]) } as DrawnCurve, [0, 9])).toEqual([1, 2, 3]);
 });

@@ -112,6 +112,16 @@ export class Network {
   }
 }
 
+/** Points [x0, y0, z0, x1, ...] of a curve from one of its samples to another; over its end where it is closed; all of
+ * them unless samples are named or known. */
+export function stretchOf(curve: DrawnCurve, samples: readonly [number, number] | null): number[] {
+  const { coordinates, samples: known } = curve.points;
+  if (!samples || !known.length) return [...coordinates];
+  const [first, last] = samples;
+  const inside = (at: number): boolean => (first <= last ? at >= first && at <= last : at >= first || at <= last);
+  return known.flatMap((at, i) => (inside(at) ? [...coordinates.subarray(3 * i, 3 * i + 3)] : []));
+}
+
 /** The numbers of several lists, each once, in rising order. */
 export function mergedNumbers(...lists: readonly Iterable<number>[]): number[] {
   return [...new Set(lists.flatMap((list) => [...list]))].sort((a, b) => a - b);

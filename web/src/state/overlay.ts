@@ -23,6 +23,12 @@ export interface Editing {
   readonly onto: number | undefined;
 }
 
+/** A place that keeps the network from being one. */
+export interface Flag {
+  readonly line: readonly Place[];
+  readonly warning: boolean;
+}
+
 /** What lies over the 3D view, in CSS px. */
 export interface OverlayContent {
   readonly labels: readonly Placement[];
@@ -31,6 +37,7 @@ export interface OverlayContent {
   /** Points that a person picked, or that a plot points at. */
   readonly marks: readonly Place[];
   readonly ruler: Ruler | undefined;
+  readonly flags: readonly Flag[];
   /** Undefined while nodes are not edited. */
   readonly editing: Editing | undefined;
   readonly metresPerPixel: number;
@@ -43,6 +50,7 @@ export const EMPTY_OVERLAY: OverlayContent = {
   tips: [],
   marks: [],
   ruler: undefined,
+  flags: [],
   editing: undefined,
   metresPerPixel: 0,
   axes: [

@@ -7,6 +7,7 @@ import type {
   CurveMarks,
   CurveUpdate,
   LiveDevice,
+  NetworkProblem,
   Reconstruction,
   RecordingSummary,
   Session,
@@ -63,6 +64,8 @@ export class SessionStore {
   result = $state.raw<Result>();
   /** The network with parameters that a hand is moving. */
   preview = $state.raw<{ readonly network: Network; readonly report: Report }>();
+  /** What keeps the curves from becoming a surface, as far as they are scanned. */
+  problems = $state.raw<readonly NetworkProblem[]>([]);
   /** The curves as the server has them, with their marks. */
   details = $state.raw<readonly Curve[]>([]);
   recordings = $state.raw<readonly RecordingSummary[]>([]);
@@ -76,6 +79,7 @@ export class SessionStore {
   #loading: string | undefined;
   readonly #client = newName("page");
   readonly #previews = new Latest((trial: Trial) => this.#try(trial));
+  readonly #checks = new Latest(() => this.#check());
   /** Whether the surface follows edits, as it does from the first one on until more is scanned. */
   #follows = false;
   /** Whether the result is older than an edit. */
@@ -253,7 +257,8 @@ export class SessionStore {
       this.problem = "";
     } catch (error) {
       if (error instanceof ApiProblem && error.status === OVERTAKEN) return;
-      this.problem = inWords(error);
+      // Where the parameters are not to blame, the list of problems says it better.
+      if (!this.parameters.isDefault || !(error instanceof ApiProblem)) this.problem = inWords(error);
       this.preview = undefined;
       if (this.#stale) this.result = undefined;
     }
@@ -288,7 +293,18 @@ export class SessionStore {
   }
 
   async #listDetails(): Promise<void> {
-    await this.#attempt(async () => (this.details = await this.api.curves(this.id)));
+    await this.#attempt(async () => {
+      this.details = await this.api.curves(this.id);
+      void this.#checks.want(undefined);
+    });
+  }
+
+  /** A curve that is being scanned has ends that meet nothing yet. */
+  async #check(): Promise<void> {
+    const ready = this.details.length > 0 && this.details.every(({ ended }) => ended);
+    if (!ready) return void (this.problems = []);
+    await this.#attempt(async () => (this.problems = (await this.api.problems(this.id)).problems));
+    if (this.problems.length) this.needSamples();
   }
 
   #detailsSoon(): void {

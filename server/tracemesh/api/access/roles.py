@@ -64,6 +64,7 @@ TABLE: dict[tuple[str, str], Need | None] = {
     ("GET", SESSION + "/recordings/{recording}"): LOOK,
     ("PATCH", SESSION + "/recordings/{recording}"): EDIT,
     ("GET", SESSION + "/node-proposals"): EDIT,
+    ("GET", SESSION + "/problems"): LOOK,
     ("POST", SESSION + "/preview"): EDIT,
     ("GET", SESSION + "/reconstructions"): LOOK,
     ("POST", SESSION + "/reconstructions"): EDIT,

@@ -77,7 +77,7 @@ def _check_marks(curve: CurveScan, name: str) -> None:
     if (np.diff(samples) < 0).any():
         raise ScanError(f"{name}: the samples marked as nodes are not in increasing order")
     if curve.closed and len(ids) > 1 and ids[0] != ids[-1]:
-        raise ScanError(f"{name} is closed, but begins at node {ids[0]} and ends at node {ids[-1]}")
+        raise ScanError(f"{name} is closed, but begins at node {ids[0]} and ends at node {ids[-1]}", mend="open")
     span = float(np.ptp(curve.distance))
     if span <= 0:
         raise ScanError(f"{name} has no length: all its distances are {curve.distance[0]:g} m")
@@ -192,4 +192,11 @@ def clean_curve(curve: CurveScan, index: int) -> CleanCurve:
 
 def clean_curves(curves: Sequence[CurveScan]) -> tuple[CleanCurve, ...]:
     """Every curve of a scan, cleaned; raises ScanError naming the first curve that cannot be used."""
-    return tuple(clean_curve(curve, i) for i, curve in enumerate(curves))
+    return tuple(_cleaned(curve, i) for i, curve in enumerate(curves))
+
+
+def _cleaned(curve: CurveScan, index: int) -> CleanCurve:
+    try:
+        return clean_curve(curve, index)
+    except ScanError as error:
+        raise ScanError(str(error), (index,), error.mend or "remove") from None

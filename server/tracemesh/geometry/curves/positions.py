@@ -49,7 +49,9 @@ def check_connected(layout: Layout, curve_indices: Ints) -> None:
     piece = label[layout.nodes[np.searchsorted(layout.marks, layout.first[:-1])]]
     names = [", ".join(curve_name(c) for c in curve_indices[piece == p]) for p in np.unique(piece)]
     pieces = "; ".join(f"({name})" for name in names)
-    raise PiecesError(f"the network is in {count} pieces that share no node: {pieces}")
+    largest = np.bincount(piece).argmax()
+    lone = tuple(int(c) for c in curve_indices[piece != largest])
+    raise PiecesError(f"the network is in {count} pieces that share no node: {pieces}", lone, "nodes")
 
 
 def node_positions(layout: Layout, vectors: Floats, weights: Floats) -> Floats:

@@ -234,7 +234,9 @@ def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> N
         if curve.closed and missing > _OPEN_GAP * curve.length:
             raise ScanError(
                 f"{curve_name(curve.index)} is marked as closed, but ends {missing:.3g} m from where it began "
-                f"({100 * missing / curve.length:.0f} % of its length)"
+                f"({100 * missing / curve.length:.0f} % of its length)",
+                (curve.index,),
+                "open",
             )
 
 

@@ -43,6 +43,20 @@ class CellComplex:
         return replace(self, network=network, faces=faces)
 
 
+@dataclass(frozen=True)
+class Fault:
+    """What keeps a network from being a cell complex.
+
+    segment: its index. end: 0 or -1, the end of the segment that it is at; None: all of it. mend: what would mend it,
+    said of the segment: "boundary" or "interior"; None: nothing so simple.
+    """
+
+    message: str
+    segment: int
+    end: int | None = None
+    mend: str | None = None
+
+
 def cell_complex(network: CurveNetwork) -> CellComplex:
     """The faces and openings of a network.
 
@@ -52,7 +66,27 @@ def cell_complex(network: CurveNetwork) -> CellComplex:
     """
     _check_arrays(network)
     _check_segments(network)
-    _check_ends(network)
+    _refuse(_loose_ends(network))
+    complex_, pieces = _traced(network)
+    _refuse(_wrong_tags(complex_) or _apart(complex_, pieces))
+    return complex_
+
+
+def find_faults(network: CurveNetwork) -> list[Fault]:
+    """All that keeps a network from being a cell complex, so that it can be shown where it is; empty if it is one.
+
+    Raises NetworkError if the arrays are malformed.
+    """
+    _check_arrays(network)
+    _check_segments(network)
+    if loose := _loose_ends(network):
+        return loose
+    complex_, pieces = _traced(network)
+    return _wrong_tags(complex_) or _apart(complex_, pieces)
+
+
+def _traced(network: CurveNetwork) -> tuple[CellComplex, Ints]:
+    """Faces and openings as the network's tags have it, right or wrong; (segments,) the piece that each belongs to."""
     cycles = trace_cycles(network)
     pieces = _pieces(network)
     paired = partners(network, cycles) if pieces.max() > 0 else {}
@@ -62,14 +96,17 @@ def cell_complex(network: CurveNetwork) -> CellComplex:
         inferred = any(segment.boundary for segment in network.segments)
     openings = _openings(network, cycles, paired)
     faces = [number for number in range(len(cycles)) if number not in openings]
-    _check_tags(network, tuple(cycles[number] for number in faces))
     place = {number: k for k, number in enumerate(faces)}
     loops = {place[a]: place[b] for a, b in paired.items() if a in place and b in place}
     complex_ = CellComplex(
         network, tuple(cycles[k] for k in faces), loops, tuple(cycles[k] for k in sorted(openings)), inferred
     )
-    _check_connected(complex_, pieces)
-    return complex_
+    return complex_, pieces
+
+
+def _refuse(faults: list[Fault]) -> None:
+    if faults:
+        raise NetworkError(faults[0].message)
 
 
 def segment_name(network: CurveNetwork, index: int) -> str:
@@ -129,18 +166,19 @@ def _check_segments(network: CurveNetwork) -> None:
         raise NetworkError(f"point {stray[0]} {word}")
 
 
-def _check_ends(network: CurveNetwork) -> None:
-    """Every end of a segment meets another one."""
+def _loose_ends(network: CurveNetwork) -> list[Fault]:
+    """Ends of segments that meet no other one."""
     ends = np.array([segment.points[[0, -1]] for segment in network.segments])
     degree = np.bincount(ends.ravel(), minlength=len(network.points))
-    dangling = np.argwhere(degree[ends] == 1)
-    if len(dangling):
-        index, end = dangling[0]
-        at = "begins" if end == 0 else "ends"
-        raise NetworkError(
-            f"{segment_name(network, index)} {at} where no other curve meets it: "
-            "mark the node where it should, or remove it"
+    return [
+        Fault(
+            f"{segment_name(network, int(index))} {'ends' if end else 'begins'} where no other curve meets it: "
+            "mark the node where it should, or remove it",
+            int(index),
+            -1 if end else 0,
         )
+        for index, end in np.argwhere(degree[ends] == 1)
+    ]
 
 
 def _with_inferred_boundary(network: CurveNetwork, cycles: list[Cycle]) -> CurveNetwork:
@@ -178,39 +216,42 @@ def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...], paired: dict[int
     return openings
 
 
-def _check_connected(complex_: CellComplex, pieces: Ints) -> None:
-    """Every piece of the network is joined to the others by faces with two loops."""
+def _apart(complex_: CellComplex, pieces: Ints) -> list[Fault]:
+    """Pieces of the network that no face with two loops joins to the first one."""
     pairs = [[pieces[complex_.faces[k].sides[0].segment] for k in pair] for pair in complex_.partners.items()]
     first, second = np.array(pairs, np.int64).reshape(-1, 2).T
     size = int(pieces.max()) + 1
     graph = sparse.coo_matrix((np.ones(len(first)), (first, second)), (size, size))
     joined = csgraph.connected_components(graph, directed=False)[1]
-    apart = np.flatnonzero(joined != joined[0])
-    if len(apart):
-        here, there = (segment_name(complex_.network, int(np.argmax(pieces == piece))) for piece in (0, apart[0]))
-        raise NetworkError(f"no curve and no face connects {here} and {there}: connect them by a curve")
+    network, here = complex_.network, segment_name(complex_.network, int(np.argmax(pieces == 0)))
+    lone = [int(np.argmax(joined[pieces] == group)) for group in np.unique(joined) if group != joined[0]]
+    return [
+        Fault(f"no curve and no face connects {here} and {segment_name(network, s)}: connect them by a curve", s)
+        for s in lone
+    ]
 
 
-def _check_tags(network: CurveNetwork, faces: tuple[Cycle, ...]) -> None:
-    """Boundary segments bound one face, the others two."""
-    count = np.zeros(len(network.segments), np.int64)
-    for face in faces:
+def _wrong_tags(complex_: CellComplex) -> list[Fault]:
+    """Boundary segments that do not bound one face, others that do not bound two."""
+    network, count = complex_.network, np.zeros(len(complex_.network.segments), np.int64)
+    for face in complex_.faces:
         np.add.at(count, [side.segment for side in face.sides], 1)
     wanted = np.array([1 if segment.boundary else 2 for segment in network.segments])
-    wrong = np.flatnonzero(count != wanted)
-    if not len(wrong):
-        return
-    index = int(wrong[0])
-    # A boundary with faces on both sides usually means that another stretch of the same opening is not tagged.
-    around = min(
-        (face for face in faces if any(side.segment == index for side in face.sides)), key=lambda face: face.turning
-    )
+    faults = [fault for index in np.flatnonzero(count != wanted) for fault in _told(complex_, int(index))]
+    return list(dict.fromkeys(faults))
+
+
+def _told(complex_: CellComplex, index: int) -> list[Fault]:
+    """What is wrong about a boundary segment with faces on both sides.
+
+    It usually means that another stretch of the same opening is not tagged.
+    """
+    network = complex_.network
+    beside = (face for face in complex_.faces if any(side.segment == index for side in face.sides))
+    around = min(beside, key=lambda face: face.turning)
     untagged = [side.segment for side in around.sides if not network.segments[side.segment].boundary]
     if around.turning < OPENING_TURN and untagged:
-        raise NetworkError(
-            f"{segment_name(network, untagged[0])} lies beside an opening and belongs to "
-            "one face only: mark it as boundary?"
-        )
-    raise NetworkError(
-        f"{segment_name(network, index)} is marked as boundary but has a face on both sides: mark it as interior?"
-    )
+        said = "lies beside an opening and belongs to one face only: mark it as boundary?"
+        return [Fault(f"{segment_name(network, s)} {said}", s, mend="boundary") for s in untagged]
+    said = "is marked as boundary but has a face on both sides: mark it as interior?"
+    return [Fault(f"{segment_name(network, index)} {said}", index, mend="interior")]
