@@ -136,7 +136,8 @@ def test_health_tells_who_measures(server: Any, ride: Any) -> None:
     rider = ride("healthy", session, name="blue", kind="phone")
     block = {"acceleration": [[0.0, 0.0, 9.81]] * 10, "magnetic": [[20.0, 0.0, -34.641]] * 10, "distance": [0.0] * 10}
     rider.send({"type": "curve.start", "seq": 0, "curve": 0})
-    rider.send({"type": "samples", "seq": 1, "curve": 0, "first_sample": 0, **block})
+    uneven = [0.01 * i + 0.002 * (i % 2) for i in range(10)]
+    rider.send({"type": "samples", "seq": 1, "curve": 0, "first_sample": 0, "time": uneven, **block})
     rider.wait_for_ack(1)
     with server.connect(f"/sessions/{session}/live") as socket:
         device = watch(socket, is_type("live.device"))[-1]
@@ -149,6 +150,7 @@ def test_health_tells_who_measures(server: Any, ride: Any) -> None:
         assert device["acceleration_norm"] == pytest.approx(9.81)
         assert device["magnetic_norm"] == pytest.approx(40, rel=1e-3)
         assert device["dip"] == pytest.approx(np.pi / 3, rel=1e-3)
+        assert device["jitter"] == pytest.approx(0.002, rel=0.1)
         rider.socket.close()
         assert watch(socket, lambda m: m["type"] == "live.device" and m["state"] == "lost")
 

@@ -426,6 +426,10 @@ export interface LiveDevice {
    * rad, angle of the field below the horizontal
    */
   dip: number | null;
+  /**
+   * s, standard deviation of the time between its last samples
+   */
+  jitter: number | null;
   kind: string;
   /**
    * mean of |magnetic|, the device's own unit

@@ -33,6 +33,9 @@ class LiveDevice(Message):
     state: Literal["live", "stale", "lost"]
     rate: float = Field(ge=0, description="samples per second, measured over the last second")
     age: float = Field(ge=0, description="s since the last sample arrived")
+    jitter: float | None = Field(
+        default=None, ge=0, description="s, standard deviation of the time between its last samples"
+    )
     acceleration_norm: float | None = Field(default=None, description="mean of |acceleration|, the device's own unit")
     magnetic_norm: float | None = Field(default=None, description="mean of |magnetic|, the device's own unit")
     dip: float | None = Field(default=None, description="rad, angle of the field below the horizontal")

@@ -1,4 +1,5 @@
 import type {
+  Calibration,
   Comparison,
   ComparisonFailure,
   ComparisonProgress,
@@ -71,6 +72,17 @@ export class Api {
 
   recordings(session: string): Promise<RecordingSummary[]> {
     return this.#json<RecordingSummary[]>("GET", `/sessions/${session}/recordings`);
+  }
+
+  /** Have a recording corrected by a calibration of its device, or by none. */
+  calibrate(session: string, recording: string, version: number | null): Promise<RecordingSummary> {
+    const path = `/sessions/${session}/recordings/${recording}`;
+    return this.#json<RecordingSummary>("PATCH", path, JSON.stringify({ calibration: version }));
+  }
+
+  /** Of a device, newest first. */
+  calibrations(device: string): Promise<Calibration[]> {
+    return this.#json<Calibration[]>("GET", `/devices/${device}/calibrations`);
   }
 
   /** Take in a rawnet or a recording as if a device had sent it. */

@@ -288,6 +288,15 @@ export class SessionStore {
     this.#listSoon();
   }
 
+  /** Choose the calibration of a recording's device that corrects it, "" for none. */
+  async calibrate(recording: string, version: string): Promise<void> {
+    await this.#attempt(async () => {
+      await this.api.calibrate(this.id, recording, version ? Number(version) : null);
+      await this.#listRecordings();
+      this.#edited();
+    });
+  }
+
   async #listRecordings(): Promise<void> {
     await this.#attempt(async () => (this.recordings = await this.api.recordings(this.id)));
   }

@@ -1,4 +1,4 @@
-"""Health of a device that records: rate, age, strength and dip of what it measures."""
+"""Health of a device that records: rate, jitter, age, strength and dip of what it measures."""
 
 from collections import deque
 from time import monotonic
@@ -46,6 +46,7 @@ class Meter:
             state="lost" if not self.connected else "stale" if age > STALE_AFTER else "live",
             rate=recent / min(WINDOW, max(now - self._began, 0.1)),
             age=age,
+            jitter=_jitter(self._block),
             acceleration_norm=_mean_norm(acceleration),
             magnetic_norm=_mean_norm(magnetic),
             dip=_dip(acceleration, magnetic),
@@ -57,6 +58,14 @@ class Meter:
         columns = self._block.acceleration, self._block.magnetic
         acceleration, magnetic = (None if column is None else np.array(column, float) for column in columns)
         return acceleration, magnetic
+
+
+def _jitter(block: Samples | None) -> float | None:
+    """By the device's clock if it has one."""
+    if block is None:
+        return None
+    times = block.received if block.time is None else block.time
+    return None if times is None or len(times) < 3 else float(np.std(np.diff(times)))
 
 
 def _mean_norm(vectors: Floats | None) -> float | None:
