@@ -28,6 +28,7 @@ class Settings(BaseSettings):
 
     host: str = Field(default="127.0.0.1", description="address to listen on")
     port: int = Field(default=8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
+    lan: bool = Field(default=False, description="serve the local network over HTTPS, with an authority of its own")
     data_dir: Path = Field(
         default_factory=lambda: user_data_path("tracemesh"), description="folder of the database and the artifacts"
     )
@@ -101,7 +102,12 @@ class Settings(BaseSettings):
     @property
     def closed(self) -> bool:
         """Whether a token is demanded."""
-        return self.host not in LOOPBACK or self.token is not None
+        return self.listen_host not in LOOPBACK or self.token is not None
+
+    @property
+    def listen_host(self) -> str:
+        """Address to listen on: with `lan` all of them, unless another one is named."""
+        return "0.0.0.0" if self.lan and self.host in LOOPBACK else self.host
 
     @classmethod
     def settings_customise_sources(

@@ -8,9 +8,10 @@ import socket
 import uvicorn
 
 from tracemesh.api.app import create_app
+from tracemesh.api.lan.serving import Lan
 from tracemesh.api.limits import PatientHttp
 from tracemesh.api.websocket import SteadyReading
-from tracemesh.api.welcome import greet
+from tracemesh.api.welcome import greet, greet_phones
 from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import open_artifacts
@@ -35,20 +36,26 @@ def serve(settings: Settings) -> None:
     logging.getLogger("alembic").setLevel(logging.WARNING)
     _prepare(settings)
     _collect_garbage_seldom()
+    lan = Lan(settings) if settings.lan else None
     try:
-        _Server(configure(settings), settings).run()
+        _Server(configure(settings, lan), settings, lan).run()
     except SystemExit:  # uvicorn's word for an address that it could not have; its log says why
-        raise ResourceError(f"cannot listen at {settings.host}:{settings.port}") from None
+        raise ResourceError(f"cannot listen at {settings.listen_host}:{settings.port}") from None
+    finally:
+        if lan is not None:
+            lan.close()
 
 
-def configure(settings: Settings) -> uvicorn.Config:
+def configure(settings: Settings, lan: Lan | None = None) -> uvicorn.Config:
     """How uvicorn is to serve the application."""
     return uvicorn.Config(
         create_app(settings),
-        host=settings.host,
+        host=settings.listen_host,
         port=settings.port,
         lifespan="on",
         http=PatientHttp,
+        ssl_certfile=None if lan is None else lan.certificate,
+        ssl_keyfile=None if lan is None else lan.key,
         ws=SteadyReading,
         ws_max_size=MAX_MESSAGE,
         ws_per_message_deflate=False,
@@ -71,15 +78,19 @@ def _collect_garbage_seldom() -> None:
 class _Server(uvicorn.Server):
     """Says how to come in as soon as it listens."""
 
-    def __init__(self, configuration: uvicorn.Config, settings: Settings) -> None:
+    def __init__(self, configuration: uvicorn.Config, settings: Settings, lan: Lan | None) -> None:
         super().__init__(configuration)
         self._settings = settings
+        self._lan = lan
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
-        port = self.servers[0].sockets[0].getsockname()[1]
+        port, context = self.servers[0].sockets[0].getsockname()[1], self.config.ssl
         if self._settings.closed:
             await asyncio.to_thread(greet, self._settings, port)
+        if self._lan is not None and context is not None:
+            plain = await asyncio.to_thread(self._lan.open, context, port)
+            greet_phones(self._lan.authority, plain)
 
 
 def _prepare(settings: Settings) -> None:

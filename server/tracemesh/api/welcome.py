@@ -1,7 +1,9 @@
 """What a server that demands a token says to the person who starts it."""
 
-import socket
+import segno
 
+from tracemesh.api.lan.addresses import main_address
+from tracemesh.api.lan.authority import Authority
 from tracemesh.settings import Settings
 from tracemesh.storage.database import Database
 from tracemesh.storage.tokens import create_token, owner_exists
@@ -10,7 +12,7 @@ from tracemesh.wire.access import TokenCreate
 
 def greet(settings: Settings, port: int) -> None:
     """Print the owner's link when nobody owns the server yet; it is the only time that its token is told."""
-    address = f"http://{_named(settings.host)}:{port}/"
+    address = f"{'https' if settings.lan else 'http'}://{_named(settings.listen_host)}:{port}/"
     if settings.token is not None:
         print(f"Open  {address}  with the token in TRACEMESH_TOKEN", flush=True)
         return
@@ -27,18 +29,17 @@ def greet(settings: Settings, port: int) -> None:
         )
 
 
+def greet_phones(authority: Authority, plain_port: int | None) -> None:
+    """Print where a phone gets the certificate, which holds no secret, and its fingerprint to compare."""
+    print(f"Certificate to trust  {authority.file}\nits SHA-256  {authority.fingerprint}", flush=True)
+    if plain_port is not None:
+        address = f"http://{main_address()}:{plain_port}/"
+        print(f"Phones first open  {address}  and get the certificate there:", flush=True)
+        segno.make(address).terminal(compact=True)
+
+
 def _named(host: str) -> str:
     """The host as others name it in an address."""
     if host in ("0.0.0.0", "::"):
         host = main_address()
     return f"[{host}]" if ":" in host else host
-
-
-def main_address() -> str:
-    """This machine's address on the network that it reaches others by; loopback when there is none. Sends nothing."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))  # an address for documentation: only the way to it is looked up
-            return str(probe.getsockname()[0])
-        except OSError:
-            return "127.0.0.1"

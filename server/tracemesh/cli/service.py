@@ -25,6 +25,12 @@ def add_serve(commands: Commands) -> None:
     parser.add_argument("--host", help="address to listen on (default 127.0.0.1; any other demands a token)")
     parser.add_argument("--port", type=port, help="port to listen on (default 8000)")
     parser.add_argument("--data-dir", type=Path, metavar="DIR", help="where sessions and meshes are kept")
+    parser.add_argument(
+        "--lan",
+        action="store_true",
+        default=None,
+        help="serve the local network over HTTPS, with a certificate for phones to trust",
+    )
     parser.set_defaults(command=_serve)
 
 
@@ -70,7 +76,7 @@ def add_demo(commands: Commands) -> None:
 def _settings(chosen: argparse.Namespace) -> Settings:
     from tracemesh.settings import Settings
 
-    given = {name: vars(chosen).get(name) for name in ("host", "port", "data_dir")}
+    given = {name: vars(chosen).get(name) for name in ("host", "port", "data_dir", "lan")}
     return Settings(**{name: value for name, value in given.items() if value is not None})
 
 
