@@ -6,7 +6,20 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from time import perf_counter
 
-from benchmarks import accuracy, growth, ingest, lengths, meshes, nodes, noisy, regression, service, surfacing, times
+from benchmarks import (
+    accuracy,
+    arrays,
+    growth,
+    ingest,
+    lengths,
+    meshes,
+    nodes,
+    noisy,
+    regression,
+    service,
+    surfacing,
+    times,
+)
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
 from benchmarks.report import read_report, record, write_report
@@ -25,6 +38,7 @@ TABLES: dict[str, Callable[[Data], Table]] = {
     "lengths": lengths.lengths,
     "times": times.times,
     "regression": regression.regression,
+    "arrays": arrays.arrays,
     "growth": growth.growth,
     "ingest": ingest.ingest,
     "requests": service.requests,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from matplotlib.figure import Figure
 
 from benchmarks.data import ROOT
-from benchmarks.pictures import curves, devices, surfaces
+from benchmarks.pictures import arrays, curves, devices, surfaces
 from benchmarks.pictures.canvas import save
 
 FOLDER = ROOT / "docs" / "pictures" / "algorithms"
@@ -18,6 +18,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "magnetic_field": devices.magnetic_field,
     "calibration": devices.calibration,
     "sketch": devices.sketch,
+    "array_network": arrays.array_network,
     "cleaning": curves.cleaning,
     "resampling": curves.resampling,
     "regression": curves.regression,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh_bridge.console import Console, typed
 from tracemesh_bridge.errors import OperatorMistake, SpoolError
 from tracemesh_bridge.health import Host
@@ -18,6 +19,8 @@ from tracemesh_bridge.uplink import Uplink
 
 TICK = 0.1
 """s between two groups of messages made durable and sent: what a sample may wait for others."""
+ARRAY_TICK = 0.02
+"""The same for an array: its readings are looked at one by one."""
 
 
 class Bridge:
@@ -31,6 +34,7 @@ class Bridge:
         self._host = host
         self._console = console
         self._recorder = Recorder(spool)
+        self._of_array = spool.hello.device.array is not None
         self._keys = KeyParser()
         self._stop = asyncio.Event()
         self._interrupted = asyncio.Event()
@@ -127,9 +131,9 @@ class Bridge:
             self._tell_trouble()
             self._uplink.wake()
             self._console.status(self._status)
-            await asyncio.sleep(TICK)
+            await asyncio.sleep(ARRAY_TICK if self._of_array else TICK)
 
-    def _take(self, reading: Reading) -> None:
+    def _take(self, reading: Reading | ArrayReading) -> None:
         with suppress(SpoolError):  # counted by the recorder, told by _keep_durable
             self._recorder.add(reading)
 
@@ -162,6 +166,11 @@ class Bridge:
 
     def _greet(self) -> None:
         progress = self._recorder.progress
+        if self._of_array:
+            self._console.say(
+                f"recording {self._spool.hello.recording}, from reading {self._spool.next_seq} on; q quits"
+            )
+            return
         if progress.open:
             self._console.say(f"going on with curve {progress.curve} after {progress.samples} samples")
         elif self._spool.next_seq:
@@ -174,14 +183,19 @@ class Bridge:
             self._console.say(f"spool: {self._trouble or 'writes again, nothing it had taken was lost'}")
 
     def _status(self) -> str:
-        progress = self._recorder.progress
-        nodes = " ".join(str(node) for _, node in progress.marks)
-        curve = (
-            f"curve {progress.curve}: {progress.samples} samples, nodes {nodes or '-'}" if progress.open else "no curve"
-        )
         waiting = self._spool.next_seq - self._uplink.acknowledged
         return (
-            f"{self._host.health.describe(self._host.clock.now())} | {curve} | {waiting} to send | {self._keys.digits}"
+            f"{self._host.health.describe(self._host.clock.now())} | {self._recorded()} | {waiting} to send "
+            f"| {self._keys.digits}"
+        )
+
+    def _recorded(self) -> str:
+        progress = self._recorder.progress
+        if self._of_array:
+            return f"{self._spool.next_seq} readings"
+        nodes = " ".join(str(node) for _, node in progress.marks)
+        return (
+            f"curve {progress.curve}: {progress.samples} samples, nodes {nodes or '-'}" if progress.open else "no curve"
         )
 
     @contextmanager

@@ -68,7 +68,8 @@ def _next(events: queue.Queue[Event], procedure: Procedure, console: Console) ->
 def _read(source: Source, stop: threading.Event, events: queue.Queue[Event]) -> None:
     try:
         for reading in source.readings(stop):
-            events.put(reading)
+            if isinstance(reading, Reading):  # an array's sensors are calibrated one by one
+                events.put(reading)
     except Exception as error:  # whatever it is, the operator must hear of it
         events.put(error)
 

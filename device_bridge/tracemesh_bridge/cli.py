@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from tracemesh.errors import TracemeshError
-from tracemesh_bridge.commands import phones, recordings, serial_port, simulated
+from tracemesh_bridge.commands import arrays, phones, recordings, serial_port, simulated
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -24,6 +24,6 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     top = argparse.ArgumentParser(prog="tracemesh-bridge", description="Connects devices to a tracemesh server.")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for group in (serial_port, phones, recordings, simulated):
+    for group in (serial_port, phones, arrays, recordings, simulated):
         group.add(commands)
     return top

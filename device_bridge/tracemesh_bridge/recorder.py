@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.device import CurveEnd, CurveStart, NodeMark, Samples
 from tracemesh_bridge.errors import OperatorMistake, SpoolError
 from tracemesh_bridge.source import Reading
@@ -62,8 +63,21 @@ class Recorder:
             ):
                 self._append(samples.model_copy(update={"seq": spool.next_seq}))
 
-    def add(self, reading: Reading) -> None:
-        """Record a sample of the current curve; between curves there is nothing to record."""
+    def add(self, reading: Reading | ArrayReading) -> None:
+        """Record a sample of the current curve; between curves there is nothing to record. Of an array, any reading."""
+        if isinstance(reading, ArrayReading):
+            self._add_of_array(reading)
+        else:
+            self._add_to_curve(reading)
+
+    def _add_of_array(self, reading: ArrayReading) -> None:
+        try:
+            self._spool.append(reading.model_copy(update={"seq": self._spool.next_seq}))
+        except SpoolError:
+            self.lost += 1
+            raise
+
+    def _add_to_curve(self, reading: Reading) -> None:
         if not self.progress.open:
             return
         if self._batch and _columns(self._batch[0]) != _columns(reading):
@@ -89,6 +103,8 @@ class Recorder:
 
     def start(self, boundary: bool) -> str:
         """Begin a curve; returns what to tell the operator. Raises OperatorMistake if one is open."""
+        if self._spool.hello.device.array:
+            raise OperatorMistake("an array has its curves already, and every reading is recorded: q quits")
         if self.progress.open:
             raise OperatorMistake(f"curve {self.progress.curve} is still open: end it with . (open) or * (closed)")
         self._append(CurveStart(seq=self._spool.next_seq, curve=self.progress.curve, boundary=boundary))

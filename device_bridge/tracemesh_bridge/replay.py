@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.device import Hello, Recorded, Samples, from_device
 from tracemesh_bridge.console import Console
 from tracemesh_bridge.errors import BridgeError
@@ -112,12 +113,18 @@ def _read(place: Path) -> tuple[Hello, list[Recorded]]:
     return hello, messages
 
 
+def _times(message: Recorded) -> list[float] | None:
+    if isinstance(message, ArrayReading):
+        return [message.time if message.received is None else message.received]
+    return (message.received or message.time) if isinstance(message, Samples) else None
+
+
 def _due(messages: list[Recorded], speed: float | None) -> Iterator[float]:
     """s after the beginning at which each message is due; marks when the samples before them are."""
     began: float | None = None
     due = 0.0
     for message in messages:
-        times = (message.received or message.time) if isinstance(message, Samples) else None
+        times = _times(message)
         if times and speed is not None:
             began = times[0] if began is None else began
             due = max(due, (times[-1] - began) / speed)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.base import Quaternion, Vector
 from tracemesh.wire.device import Device
 
@@ -69,6 +70,9 @@ class Source(Protocol):
 
     device: Device
 
-    def readings(self, stop: threading.Event) -> Iterator[Reading]:
-        """Every sample in the order measured, until `stop` is set; finds a lost device again by itself."""
+    def readings(self, stop: threading.Event) -> Iterator[Reading | ArrayReading]:
+        """Every sample, or reading of an array, in the order measured, until `stop` is set.
+
+        Finds a lost device again by itself.
+        """
         ...

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.device import CurveStart, Hello, Recorded, Samples, from_device
 from tracemesh_bridge.errors import SpoolError
 
@@ -155,7 +156,7 @@ class Spool:
 
     def _write(self, message: Recorded) -> None:
         # A segment must start with a message from which a restart can go on: one that says how many samples there are.
-        restartable = isinstance(message, Samples | CurveStart)
+        restartable = isinstance(message, Samples | CurveStart | ArrayReading)
         if self._file < 0 or (self._size >= self._segment_bytes and restartable):
             self._begin_segment(message.seq)
         self._write_line(_line(message))

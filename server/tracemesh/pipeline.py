@@ -8,17 +8,27 @@ from time import perf_counter
 
 import numpy as np
 
-from tracemesh.errors import PiecesError, ScanError
+from tracemesh.errors import InputError, PiecesError, ScanError
 from tracemesh.formats.meshes import write_mesh
 from tracemesh.formats.networks import write_network
-from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkResult, reconstruct_network
+from tracemesh.formats.readings import reading_of, sensor_array, sensor_rotations
+from tracemesh.formats.recordings import Recording
+from tracemesh.geometry.curves.array_network import ArrayNetwork, ArraySolver
+from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.reconstruction import (
+    NetworkParameters,
+    NetworkResult,
+    reconstruct_network,
+    wanted_weights,
+)
 from tracemesh.geometry.curves.sketch import give_lengths
 from tracemesh.geometry.curves.spline_network import resample_network
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.nodes.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
-from tracemesh.geometry.scan import Scan, curve_name
+from tracemesh.geometry.scan import Floats, Scan, curve_name
 from tracemesh.geometry.sensing.odometry import NOMINAL_SPEED
+from tracemesh.geometry.sensor_array import SensorArray
 from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 from tracemesh.wire.resources import ReconstructionParameters
 
@@ -33,6 +43,10 @@ MOST_DIVISIONS = 3000
 """Vertices along a network's diagonal: more would make a mesh of many million."""
 SOFT_LENGTH = 2.0
 """Edge lengths over which a soft surface smooths its network."""
+FLATTEST = 1e-3
+"""Diagonal over length of an array's curves that a step is still derived from."""
+WORST_GAP = 0.1
+"""Of a segment's length: what an array's curves may miss one another by before somebody should know."""
 
 
 @dataclass(frozen=True)
@@ -88,12 +102,105 @@ def reconstruct(
     made = {"generator": _generator(), "lengths": _lengths_report(scan), "calibrations": _calibrations_report(scan)}
     nodes = {"nodes": _nodes_report(found)} if found else {}
     result = Reconstruction(curves.network, None, {**made, **nodes, "network": curves.report}, found)
-    if parameters.surface:
-        surface = SurfaceParameters(_mesh_size(parameters, result.network), SOFT_LENGTH if parameters.soft else None)
-        result = _with_surface(result, surface, _part(report, NETWORK_SHARE, 1.0))
+    return _finished(result, parameters, parameters.surface, report, begin)
+
+
+def reconstruct_measured(
+    measured: Scan | Recording,
+    parameters: ReconstructionParameters,
+    progress: Progress | None = None,
+    lengths: Mapping[tuple[int, int], float] | None = None,
+) -> Reconstruction:
+    """Of a scan, or of one reading of a fixed array's recording; raises what `reconstruct` does, and InputError for
+    what only the other one has.
+    """
+    if isinstance(measured, Scan):
+        if parameters.reading is not None:
+            raise InputError("a reading can be chosen of a fixed array's recording, and this is a scan of curves")
+        return reconstruct(measured, parameters, progress, lengths)
+    if lengths:
+        raise InputError("lengths can be given for scanned curves: an array's spacings are those of its recording")
+    device = measured.hello.device
+    rotations = sensor_rotations(reading_of(measured, parameters.reading), device)
+    return reconstruct_reading(sensor_array(device), rotations, parameters, progress)
+
+
+def reconstruct_reading(
+    array: SensorArray,
+    rotations: Floats,
+    parameters: ReconstructionParameters | None = None,
+    progress: Progress | None = None,
+) -> Reconstruction:
+    """Curve network of one reading of an array, sensor -> world (s, 3, 3), and the surface that spans it, if its curves
+    enclose one. Its frames are smoothed only if smoothing lengths are given.
+
+    Raises ScanError when it cannot be reconstructed, SurfaceError when no valid mesh spans its network, and whatever
+    `progress` raises.
+    """
+    parameters = parameters or ReconstructionParameters()
+    report = progress or _silent
+    begin = perf_counter()
+    if parameters.infer_nodes or parameters.curve_bias == "on":
+        raise ScanError("an array's curves share their sensors: it has no nodes to find and no curve to turn")
+    report("network", 0.0)
+    smoothing = wanted_weights(network_parameters(parameters))
+    step = _array_step(array, rotations, parameters)
+    solved = ArraySolver(array, step).solve(rotations, smoothing)
+    made: dict[str, object] = {"generator": _generator(), "network": _array_report(array, solved, step, smoothing)}
+    surface = parameters.surface and array.encloses
+    return _finished(Reconstruction(solved.network, None, made), parameters, surface, report, begin)
+
+
+def _finished(
+    result: Reconstruction, parameters: ReconstructionParameters, surface: bool, progress: Progress, begin: float
+) -> Reconstruction:
+    """With its surface, if wanted, and the time it all took since `begin`."""
+    if surface:
+        wanted = SurfaceParameters(_mesh_size(parameters, result.network), SOFT_LENGTH if parameters.soft else None)
+        result = _with_surface(result, wanted, _part(progress, NETWORK_SHARE, 1.0))
     result.report["seconds"] = perf_counter() - begin
-    report("done", 1.0)
+    progress("done", 1.0)
     return result
+
+
+def _array_step(array: SensorArray, rotations: Floats, parameters: ReconstructionParameters) -> float:
+    wanted = network_parameters(parameters)
+    if wanted.step is not None:
+        return wanted.step
+    coarse = ArraySolver(array, float(max(curve.spacing.max() for curve in array.curves)))
+    length = sum(float(curve.spacing.sum()) for curve in array.curves)
+    return wanted.step_fraction * max(coarse.solve(rotations).network.diagonal, FLATTEST * length)
+
+
+def _array_report(array: SensorArray, solved: ArrayNetwork, step: float, weights: Weights | None) -> dict[str, object]:
+    gaps, network = np.linalg.norm(solved.gaps, axis=1), solved.network
+    worst = float((gaps / solved.segment_lengths).max())
+    warnings = []
+    if worst > WORST_GAP:
+        warnings.append(
+            f"its curves miss one another by up to {100 * worst:.0f} % of the way between two nodes: "
+            "are spacings and mountings what they are said to be?"
+        )
+    if not array.encloses:
+        warnings.append("the array's curves enclose nothing: there is a network, but no surface")
+    return {
+        "parameters": {
+            "step_m": step,
+            "stretch_m": weights.stretch if weights else 0.0,
+            "bend_m": weights.bend if weights else 0.0,
+        },
+        "sizes": {
+            "curves": len(array.curves),
+            "sensors": array.sensor_count,
+            "points": len(network.points),
+            "nodes": len(network.nodes),
+            "segments": len(network.segments),
+            "length_m": float(solved.segment_lengths.sum()),
+            "diagonal_m": network.diagonal,
+        },
+        "closure": {"rms_m": float(np.sqrt(np.mean(gaps**2))), "max_m": float(gaps.max())},
+        "warnings": warnings,
+    }
 
 
 def is_used(proposal: NodeProposal) -> bool:

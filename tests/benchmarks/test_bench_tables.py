@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import accuracy, growth, lengths, meshes, nodes, noisy, regression, surfacing, times
+from benchmarks import accuracy, arrays, growth, lengths, meshes, nodes, noisy, regression, surfacing, times
 from benchmarks.data import Data
 from benchmarks.report import read_report, record, write_report
 from benchmarks.table import Column, Table
@@ -165,3 +165,10 @@ def test_plain_energy_is_the_solvers_and_has_its_gradient_and_hessian() -> None:
     assert np.sum(energy.gradient(frames) * change) == pytest.approx(slope, rel=1e-6)
     bend = (energy.gradient(ahead) - energy.gradient(behind)) / (2 * step)
     assert energy.hessian(frames, change) == pytest.approx(bend, rel=1e-5, abs=1e-5 * np.abs(bend).max())
+
+
+def test_arrays_are_quick_and_near_the_truth() -> None:
+    table = arrays.arrays(WITHOUT, moments=2, repeats=1)
+    assert [row[0] for row in table.rows] == ["ribbon", "comb", "lattice"]
+    assert max(numbers(table, 5)) < 1
+    assert max(numbers(table, 6)) < 3

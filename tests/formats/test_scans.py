@@ -10,7 +10,8 @@ from tracemesh.geometry.simulated.simulation import exact_scan
 SCAN = exact_scan(leaf(), 0.05)
 
 
-def lengths(scan: Scan) -> list[int]:
+def lengths(scan: Scan | Recording) -> list[int]:
+    assert isinstance(scan, Scan)
     return [len(c.distance) for c in scan.curves]
 
 

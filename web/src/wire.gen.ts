@@ -8,6 +8,60 @@ export interface Ack {
   type: "ack";
 }
 /**
+ * Sensors in a row along one curve.
+ */
+export interface ArrayCurve {
+  /**
+   * the curve bounds the surface
+   */
+  boundary: boolean;
+  /**
+   * the last sensor is followed by the first
+   */
+  closed: boolean;
+  /**
+   * [w, x, y, z]: turns this curve's axes (tangent, normal, B) into a sensor's own axes, after which the device's mounting does; one for all of its sensors, or one for each
+   */
+  mounting: [number, number, number, number][];
+  /**
+   * in their order along the curve, none twice
+   */
+  sensors: number[];
+  /**
+   * m along the curve from each sensor to the next; of a closed curve also from the last to the first
+   */
+  spacing: number[];
+}
+/**
+ * What all sensors of an array measured at one time; every column has one row per sensor.
+ *
+ * The message's own number, `seq`, is the reading's: an array's recording consists of nothing else.
+ */
+export interface ArrayReading {
+  /**
+   * sensor axes, up at rest; any unit
+   */
+  acceleration: [number, number, number][] | null;
+  /**
+   * sensor axes; any unit
+   */
+  magnetic: [number, number, number][] | null;
+  /**
+   * [w, x, y, z], sensor to ENU
+   */
+  quaternion: [number, number, number, number][] | null;
+  /**
+   * s since 1970 UTC, when the bridge had the reading
+   */
+  received: number | null;
+  seq: number;
+  /**
+   * s, the device's own clock
+   */
+  time: number;
+  type: "reading";
+}
+/**
  * One calibration of one device.
  */
 export interface Calibration {
@@ -268,6 +322,10 @@ export interface CurveStart {
  */
 export interface Device {
   /**
+   * present when the device is a fixed array of sensors
+   */
+  array: SensorArray | null;
+  /**
    * of this device, chosen by whoever records; the readings are as measured all the same
    */
   calibration: Calibration | null;
@@ -289,6 +347,12 @@ export interface Device {
    * present when the device counts wheel ticks
    */
   wheel: Wheel | null;
+}
+/**
+ * Which sensors are where along which curves.
+ */
+export interface SensorArray {
+  curves: ArrayCurve[];
 }
 /**
  * Directions in the world (ENU) that the accelerometer and the magnetometer see at rest.
@@ -437,7 +501,7 @@ export interface LiveDevice {
   magnetic_norm: number | null;
   name: string;
   /**
-   * samples per second, measured over the last second
+   * samples, or readings of an array, per second, over the last second
    */
   rate: number;
   recording: string;
@@ -491,6 +555,25 @@ export interface LivePoints {
   type: "live.points";
 }
 /**
+ * The network of one reading of a fixed array; a newer one of the same recording replaces it.
+ *
+ * Its curves are numbered as in the array's declaration, its nodes as their sensors.
+ */
+export interface LiveReading {
+  curves: LiveCurve[];
+  nodes: NodePosition[];
+  /**
+   * of the reading within the session
+   */
+  number: number;
+  recording: string;
+  /**
+   * s, the device's own clock
+   */
+  time: number;
+  type: "live.reading";
+}
+/**
  * A reconstruction was created, made progress, or ended.
  */
 export interface LiveReconstruction {
@@ -540,6 +623,10 @@ export interface ReconstructionParameters {
    * distance of the surface's vertices: % of the network's diagonal, or m; none: as its points
    */
   mesh_size: string | null;
+  /**
+   * of a fixed array: number of the reading within the session; none: the last one
+   */
+  reading: number | null;
   /**
    * let the surface leave a noisy network a little
    */
@@ -695,6 +782,10 @@ export interface PreviewWish {
    */
   mesh_size: string | null;
   /**
+   * of a fixed array: number of the reading within the session; none: the last one
+   */
+  reading: number | null;
+  /**
    * let the surface leave a noisy network a little
    */
   soft: boolean;
@@ -727,6 +818,23 @@ export interface Problem {
   status: number;
   title: string;
   type: string;
+}
+/**
+ * GET /sessions/{session}/readings: when the readings of fixed arrays were taken.
+ */
+export interface Readings {
+  /**
+   * of all readings of the session; they are numbered 0, 1, 2, ...
+   */
+  count: number;
+  /**
+   * number of the reading to which the first of `times` belongs
+   */
+  first: number;
+  /**
+   * s, the device's own clock
+   */
+  times: number[];
 }
 /**
  * A recording of a session: what one device sent, or one uploaded file.
@@ -853,6 +961,10 @@ export interface Session {
    * distinct node numbers marked
    */
   nodes: number;
+  /**
+   * of fixed arrays
+   */
+  readings: number;
   samples: number;
 }
 /**
@@ -878,6 +990,10 @@ export interface Snapshot {
   curves: LiveCurve[];
   devices: LiveDevice[];
   nodes: NodePosition[];
+  /**
+   * the newest one of every array that has one
+   */
+  readings: LiveReading[];
   reconstruction: Reconstruction | null;
   session: string;
   type: "live.snapshot";

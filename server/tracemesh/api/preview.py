@@ -5,29 +5,32 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from tracemesh.api.live.drawing import flat
+from tracemesh.api.live.readings import array_curves, live_reading, node_positions
 from tracemesh.errors import Conflict, InputError, ScanError, TracemeshError
 from tracemesh.formats.rawnet import write_rawnet
 from tracemesh.formats.recordings import with_marks
 from tracemesh.geometry.curves.closed_curves import begun_at_nodes
-from tracemesh.geometry.scan import Floats, Scan
+from tracemesh.geometry.scan import Scan
 from tracemesh.jobs.attached import SolvedNetwork
 from tracemesh.jobs.problems import find_problems
 from tracemesh.jobs.proposals import propose_nodes
+from tracemesh.jobs.readings import SolvedReading, draw_reading, solve_reading
 from tracemesh.jobs.slot import Slot
 from tracemesh.storage.curves import list_curves
 from tracemesh.storage.database import Database
 from tracemesh.storage.models import new_id
+from tracemesh.storage.readings import StoredReading, is_of_array, load_reading
 from tracemesh.storage.scans import load_sent
-from tracemesh.wire.live import LiveCurve, Preview
+from tracemesh.wire.live import LiveCurve, LiveReading, Preview
 from tracemesh.wire.resources import (
     Curve,
     CurveMarks,
     NetworkProblem,
     NetworkProblems,
-    NodePosition,
     NodeProposals,
     PreviewWish,
 )
@@ -75,17 +78,35 @@ class Previewer:
         """
         wish = self._newest[session, client] = object()
         try:
-            loaded = await self._scan(session)
-            scan = _marked(loaded.scan, loaded.indices, wanted.marks)
-            name = f"{loaded.name} {wanted.marks}"
+            if stored := await self._of_array(session, wanted.reading):
+                work: Callable[[], Awaitable[Preview]] = partial(self._solve_reading, stored, wanted)
+            else:
+                work = partial(self._solve_scan, await self._scan(session), wanted)
             async with self._turn:
                 if self._newest.get((session, client)) is not wish:
                     raise Conflict("the same client asked for another preview meanwhile")
-                solved = await self._run(_solve, name, scan, loaded.indices, wanted, self._budget)
-                return _preview(solved, loaded.curves)
+                return await work()
         finally:
             if self._newest.get((session, client)) is wish:
                 del self._newest[session, client]
+
+    async def _solve_reading(self, stored: StoredReading, wanted: PreviewWish) -> Preview:
+        solved = await self._run(solve_reading, stored.device, stored.reading, wanted)
+        return _preview(solved, array_curves(stored.device, solved))
+
+    async def _solve_scan(self, loaded: Loaded, wanted: PreviewWish) -> Preview:
+        scan = _marked(loaded.scan, loaded.indices, wanted.marks)
+        name = f"{loaded.name} {wanted.marks}"
+        solved = await self._run(_solve, name, scan, loaded.indices, wanted, self._budget)
+        return _preview(solved, _session_curves(solved, loaded.curves))
+
+    async def reading(self, session: str, number: int) -> LiveReading:
+        """The network of a reading as the live view draws it; raises NotFound, InputError and ScanError."""
+        stored = await self._of_array(session, number)
+        assert stored is not None
+        async with self._turn:
+            solved = await self._run(draw_reading, stored.device.model_dump_json(), stored.reading)
+        return live_reading(stored, solved)
 
     async def propose(self, session: str) -> NodeProposals:
         """Nodes that were found in a session; raises NotFound and ScanError."""
@@ -101,6 +122,8 @@ class Previewer:
 
     async def problems(self, session: str) -> NetworkProblems:
         """What keeps a session's curves from becoming a surface; raises NotFound."""
+        if await self._of_array(session, None):  # what is declared hangs together
+            return NetworkProblems(problems=[])
         try:
             loaded = await self._scan(session)
         except ScanError as error:
@@ -109,6 +132,17 @@ class Previewer:
         async with self._turn:
             found = await self._run(find_problems, loaded.scan, [by_index[i] for i in loaded.indices])
         return NetworkProblems(problems=found)
+
+    async def _of_array(self, session: str, number: int | None) -> StoredReading | None:
+        """The reading that is meant, unless it is the session's scanned curves that are."""
+        await self._flush()
+
+        def read() -> StoredReading | None:
+            with self._database.read() as transaction:
+                meant = is_of_array(transaction, session, number)
+                return load_reading(transaction, session, number) if meant else None
+
+        return await asyncio.to_thread(read)
 
     async def _run(self, function: Callable[..., T], *arguments: object) -> T:
         try:
@@ -160,25 +194,20 @@ def _solve(name: str, scan: Scan, indices: Sequence[int], wanted: PreviewWish, b
     return solve_warm(name, scan, indices, wanted, budget)
 
 
-def _preview(solved: SolvedNetwork, curves: Sequence[Curve]) -> Preview:
-    return Preview(
-        curves=[
-            LiveCurve(
-                index=curve.index,
-                boundary=curve.boundary,
-                closed=curve.closed,
-                ended=curve.ended,
-                positions=flat(solved.curves[curve.index].positions),
-                samples=solved.curves[curve.index].samples.tolist(),
-            )
-            for curve in curves
-            if curve.index in solved.curves
-        ],
-        nodes=[NodePosition(node=number, position=_vector(p)) for number, p in sorted(solved.nodes.items())],
-        report=solved.report,
-    )
+def _preview(solved: SolvedNetwork | SolvedReading, curves: list[LiveCurve]) -> Preview:
+    return Preview(curves=curves, nodes=node_positions(solved), report=solved.report)
 
 
-def _vector(position: Floats) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in position)
-    return x, y, z
+def _session_curves(solved: SolvedNetwork, curves: Sequence[Curve]) -> list[LiveCurve]:
+    return [
+        LiveCurve(
+            index=curve.index,
+            boundary=curve.boundary,
+            closed=curve.closed,
+            ended=curve.ended,
+            positions=flat(solved.curves[curve.index].positions),
+            samples=solved.curves[curve.index].samples.tolist(),
+        )
+        for curve in curves
+        if curve.index in solved.curves
+    ]

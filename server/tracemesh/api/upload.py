@@ -65,7 +65,7 @@ def parse_upload(content: bytes, session: str, name: str) -> Upload:
 
 def _rehearse(upload: Upload) -> None:
     """Refuse a file that contradicts itself before any of it is stored."""
-    state = RecordingState(0, SessionState("", 0, 0), upload.hello, 0, 0, 0)
+    state = RecordingState(0, SessionState("", 0, 0, 0), upload.hello, 0, 0, 0)
     for message, payload in upload.messages:
         try:
             state.check(message)

@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracemesh.cli.arguments import Commands, iso_date, length, mesh_path, mesh_size, place, step
+from tracemesh.cli.arguments import Commands, iso_date, length, mesh_path, mesh_size, place, seed, step
 from tracemesh.errors import InputError
 from tracemesh.files import check_writable, read_text, write_all
 from tracemesh.terminal import ProgressLine
@@ -61,6 +61,12 @@ def add_reconstruct(commands: Commands) -> None:
     parser.add_argument(
         "--calibration", metavar="CAL.json", help="of the device, as tracemesh-bridge calibrate writes it"
     )
+    parser.add_argument(
+        "--reading",
+        type=seed,
+        metavar="N",
+        help="of a fixed array's recording: which reading, from 0 (default the last)",
+    )
     parser.add_argument("--infer-nodes", action="store_true", help="find the nodes that are not marked")
     parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
     parser.add_argument("--no-surface", action="store_true", help="stop after the network; MESH is then not written")
@@ -107,7 +113,7 @@ def _add_mesh_output(parser: argparse.ArgumentParser) -> None:
 def _reconstruct(chosen: argparse.Namespace) -> int:
     from tracemesh.formats.calibrations import read_calibration
     from tracemesh.formats.scans import read_scan
-    from tracemesh.pipeline import reconstruct
+    from tracemesh.pipeline import reconstruct_measured
 
     parameters = ReconstructionParameters(
         step=chosen.step,
@@ -119,12 +125,13 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
         infer_nodes=chosen.infer_nodes,
         soft=chosen.soft,
         surface=not chosen.no_surface,
+        reading=chosen.reading,
     )
     check_writable(chosen.output, chosen.network, chosen.report)
     calibration = read_calibration(read_text(chosen.calibration), chosen.calibration) if chosen.calibration else None
-    scan = read_scan(read_text(chosen.input), chosen.input, _field(chosen, calibration), calibration)
+    measured = read_scan(read_text(chosen.input), chosen.input, _field(chosen, calibration), calibration)
     with ProgressLine() as progress:
-        result = reconstruct(scan, parameters, progress, dict(chosen.length))
+        result = reconstruct_measured(measured, parameters, progress, dict(chosen.length))
     if result.nodes:
         print(f"tracemesh: {_nodes_in_words(result.nodes)}", file=sys.stderr)
     _write_results(chosen, result)

@@ -25,6 +25,7 @@ from tracemesh.geometry.simulated.simulation import (
     WHEEL_CIRCUMFERENCE,
     SimulatedCurve,
 )
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.device import (
     MAX_SAMPLES,
     CurveEnd,
@@ -203,6 +204,8 @@ def _raw_curves(recording: Recording, before: int) -> Iterator[_RawCurve]:
     """Curves worth reconstructing, in order of their beginning."""
     curves: dict[int, _RawCurve] = {}
     for message in recording.messages:
+        if isinstance(message, ArrayReading):
+            raise InputError(f"recording {recording.hello.recording}: wanted curves, got readings of an array")
         where = f"recording {recording.hello.recording}: curve {before + message.curve + 1}"
         if isinstance(message, CurveStart):
             if message.curve in curves:

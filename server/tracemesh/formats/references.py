@@ -9,13 +9,14 @@ from tracemesh.formats.calibrations import calibrate
 from tracemesh.formats.recordings import Recording
 from tracemesh.geometry.sensing.magnetic_field import field_at_rest
 from tracemesh.geometry.sensing.orientation import ReferenceField
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.calibration import Calibration
-from tracemesh.wire.device import Reference, Samples
+from tracemesh.wire.device import Recorded, Reference, Samples
 
 
 def with_reference(recording: Recording, field: ReferenceField) -> Recording:
     """The recording as if made in this field; raises InputError where that makes no difference to any curve."""
-    if not any(_needs_reference(m) for m in recording.messages if isinstance(m, Samples)):
+    if not any(_needs_reference(m) for m in recording.messages):
         raise InputError(
             f"recording {recording.hello.recording}: its orientations do not depend on the magnetic field of a place: "
             "wanted acceleration and magnetic without rotation_rate"
@@ -52,6 +53,10 @@ def measured_reference(recording: Recording) -> ReferenceField:
     return field_at_rest(right["acceleration"], right["magnetic"])
 
 
-def _needs_reference(block: Samples) -> bool:
-    others = (block.quaternion, block.tangent and block.normal, block.rotation_rate and block.time)
+def _needs_reference(message: Recorded) -> bool:
+    if isinstance(message, ArrayReading):
+        return message.quaternion is None
+    if not isinstance(message, Samples):
+        return False
+    others = (message.quaternion, message.tangent and message.normal, message.rotation_rate and message.time)
     return all(other is None for other in others)

@@ -10,6 +10,7 @@ from tracemesh.errors import Cancelled, TracemeshError, Unavailable
 from tracemesh.formats.networks import read_network
 from tracemesh.storage.artifacts import ArtifactStore, artifact_row
 from tracemesh.storage.database import Database
+from tracemesh.storage.readings import StoredReading, is_of_array, load_reading
 from tracemesh.storage.reconstructions import Claim, begin, finish, get_reconstruction, report_progress
 from tracemesh.storage.scans import load_scan
 from tracemesh.wire.resources import JobState, Reconstruction
@@ -76,9 +77,20 @@ class _Attempt:
     def _from_scan(self, wanted: Reconstruction) -> "Result":
         from tracemesh.pipeline import reconstruct
 
+        session, number = wanted.session, wanted.parameters.reading
         with self._database.read() as transaction:
-            scan, _ = load_scan(transaction, wanted.session)
-        return reconstruct(scan, wanted.parameters, self._progress)
+            of_array = is_of_array(transaction, session, number)
+            measured = load_reading(transaction, session, number) if of_array else load_scan(transaction, session)[0]
+        if isinstance(measured, StoredReading):
+            return self._from_reading(wanted, measured)
+        return reconstruct(measured, wanted.parameters, self._progress)
+
+    def _from_reading(self, wanted: Reconstruction, stored: StoredReading) -> "Result":
+        from tracemesh.formats.readings import sensor_array, sensor_rotations
+        from tracemesh.pipeline import reconstruct_reading
+
+        rotations = sensor_rotations(stored.reading, stored.device)
+        return reconstruct_reading(sensor_array(stored.device), rotations, wanted.parameters, self._progress)
 
     def _span(self, wanted: Reconstruction) -> "Result":
         """The surface over the network that came with the wish."""

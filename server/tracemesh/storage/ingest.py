@@ -8,10 +8,11 @@ from sqlalchemy.orm import Session
 
 from tracemesh.errors import Refused
 from tracemesh.storage.devices import add_calibration, corrected_hello, seen
-from tracemesh.storage.models import CurveRow, MarkRow, MessageRow, RecordingRow, SessionRow, new_id
+from tracemesh.storage.models import CurveRow, MarkRow, MessageRow, ReadingRow, RecordingRow, SessionRow, new_id
 from tracemesh.storage.states import CurveState, RecordingState, SessionState
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.base import PROTOCOL_VERSION
-from tracemesh.wire.device import CurveEnd, CurveStart, Hello, NodeMark, Recorded
+from tracemesh.wire.device import CurveEnd, CurveStart, Hello, NodeMark, OfCurve, Recorded
 
 Row = dict[str, object]
 MARK = ("recording_key", "number", "sample", "node")
@@ -35,16 +36,26 @@ class Group:
     marks: list[Row] = field(default_factory=list)
     unmarks: list[Row] = field(default_factory=list)
     ends: list[Row] = field(default_factory=list)
+    readings: list[Row] = field(default_factory=list)
     travelled: dict[tuple[int, int], Row] = field(default_factory=dict)
     reached: dict[int, Reached] = field(default_factory=dict)
 
     def add(self, state: RecordingState, message: Recorded, payload: bytes) -> None:
         """Take a message that `state` has just advanced over."""
+        key = state.key
+        self.messages.append({"recording_key": key, "seq": message.seq, "payload": payload})
+        self.acknowledge(state)
+        if isinstance(message, ArrayReading):
+            index = state.session.next_reading - 1
+            row: Row = {"session_id": state.session.id, "index": index, "recording_key": key, "seq": message.seq}
+            self.readings.append({**row, "time": message.time})
+        else:
+            self._add_of_curve(state, message)
+
+    def _add_of_curve(self, state: RecordingState, message: OfCurve) -> None:
         key, number = state.key, message.curve
         row: Row = {"recording_key": key, "number": number}
         curve: Row = {"at_key": key, "at_number": number}
-        self.messages.append({"recording_key": key, "seq": message.seq, "payload": payload})
-        self.acknowledge(state)
         if isinstance(message, CurveStart):
             index = state.curves[number].index
             self.starts.append({**row, "session_id": state.session.id, "index": index, "boundary": message.boundary})
@@ -81,6 +92,7 @@ def commit(session: Session, group: Group) -> None:
         (insert(MarkRow), group.marks),
         (update(CurveRow).where(this_curve), list(group.travelled.values())),
         (update(CurveRow).where(this_curve), group.ends),
+        (insert(ReadingRow), group.readings),
         (
             update(RecordingRow).where(RecordingRow.key == bindparam("at_key")),
             [r._asdict() for r in group.reached.values()],
@@ -137,8 +149,13 @@ def _create(session: Session, hello: Hello, payload: bytes) -> RecordingRow:
 
 def _session_state(session: Session, identifier: str) -> SessionState:
     last = session.scalar(select(func.max(CurveRow.index)).where(CurveRow.session_id == identifier))
+    newest = session.scalar(select(func.max(ReadingRow.index)).where(ReadingRow.session_id == identifier))
     size = session.scalar(select(func.sum(RecordingRow.bytes)).where(RecordingRow.session_id == identifier))
-    return SessionState(identifier, 0 if last is None else last + 1, int(size or 0))
+    return SessionState(identifier, _after(last), _after(newest), int(size or 0))
+
+
+def _after(index: int | None) -> int:
+    return 0 if index is None else index + 1
 
 
 def _curve_states(session: Session, key: int) -> dict[int, CurveState]:

@@ -169,6 +169,18 @@ class MarkRow(Base):
     node: Mapped[int] = mapped_column(Long)
 
 
+class ReadingRow(Base):
+    """One reading of a fixed array: message `seq` of its recording; `index` counts all readings of the session."""
+
+    __tablename__ = "readings"
+
+    session_id: Mapped[str] = mapped_column(ForeignKey("sessions.id", ondelete="CASCADE"), primary_key=True)
+    index: Mapped[int] = mapped_column(Long, primary_key=True)
+    recording_key: Mapped[int] = mapped_column(ForeignKey("recordings.key", ondelete="CASCADE"), index=True)
+    seq: Mapped[int] = mapped_column(Long)
+    time: Mapped[float]
+
+
 class ReconstructionRow(Base):
     """A reconstruction of a session: this row is the job.
 

@@ -4,7 +4,7 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import Conflict, NotFound
-from tracemesh.storage.models import CurveRow, MarkRow, ReconstructionRow, SessionRow, new_id
+from tracemesh.storage.models import CurveRow, MarkRow, ReadingRow, ReconstructionRow, SessionRow, new_id
 from tracemesh.wire.resources import Session, SessionCreate, SessionUpdate
 
 
@@ -53,6 +53,12 @@ def delete_session(transaction: Transaction, identifier: str) -> None:
     transaction.execute(delete(SessionRow).where(SessionRow.id == identifier))
 
 
+def reading_count(transaction: Transaction, identifier: str) -> int:
+    """Readings of fixed arrays in a session: they are numbered from 0 without a gap."""
+    last = transaction.scalar(select(func.max(ReadingRow.index)).where(ReadingRow.session_id == identifier))
+    return 0 if last is None else last + 1
+
+
 def session_row(transaction: Transaction, identifier: str) -> SessionRow:
     """Row of a session; raises NotFound."""
     row = transaction.get(SessionRow, identifier)
@@ -77,6 +83,7 @@ def _session(transaction: Transaction, row: SessionRow) -> Session:
         curves=curves,
         samples=int(samples),
         nodes=nodes or 0,
+        readings=reading_count(transaction, row.id),
         latest_reconstruction=_latest_reconstruction(transaction, row.id),
     )
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, field
 
 from tracemesh.errors import Refused
-from tracemesh.wire.device import CurveEnd, CurveStart, Hello, NodeMark, Recorded, Samples, Wheel
+from tracemesh.wire.arrays import ArrayReading, misfit
+from tracemesh.wire.device import CurveEnd, CurveStart, Hello, NodeMark, OfCurve, Recorded, Samples, Wheel
 
 TURNS_RANGE = 2**16
 """A wheel's turns are counted with 16 bits."""
@@ -22,10 +23,11 @@ class CurveState:
 
 @dataclass
 class SessionState:
-    """What recordings of one session share."""
+    """What recordings of one session share: how its next curve and the next reading of an array are numbered."""
 
     id: str
     next_index: int
+    next_reading: int
     bytes: int
 
 
@@ -45,6 +47,15 @@ class RecordingState:
         """Raise Refused when the message does not fit what came before it."""
         if message.seq > self.next_seq:
             raise Refused("gap", f"wanted message {self.next_seq}, got {message.seq}", self.next_seq)
+        if isinstance(message, ArrayReading):
+            if why := misfit(self.hello.device.array, message):
+                raise Refused("malformed", f"message {message.seq}: {why}")
+        elif self.hello.device.array is not None:
+            raise Refused("malformed", f"message {message.seq}: wanted a reading from an array, got {message.type}")
+        else:
+            self._check_order(message)
+
+    def _check_order(self, message: OfCurve) -> None:
         curve = self.curves.get(message.curve)
         if isinstance(message, CurveStart):
             if curve is not None:
@@ -70,16 +81,16 @@ class RecordingState:
         self.next_seq += 1
         self.bytes += size
         self.session.bytes += size
-        if isinstance(message, CurveStart):
+        if isinstance(message, ArrayReading):
+            self.session.next_reading += 1
+        elif isinstance(message, CurveStart):
             self.curves[message.curve] = CurveState(self.session.next_index)
             self.session.next_index += 1
-            return
-        curve = self.curves[message.curve]
-        if isinstance(message, Samples):
-            curve.samples += message.count
-            self._travel(curve, message)
+        elif isinstance(message, Samples):
+            self.curves[message.curve].samples += message.count
+            self._travel(self.curves[message.curve], message)
         elif isinstance(message, CurveEnd):
-            curve.ended = True
+            self.curves[message.curve].ended = True
 
     def _travel(self, curve: CurveState, message: Samples) -> None:
         first, last = _odometer(message, self.hello)

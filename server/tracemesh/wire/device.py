@@ -3,6 +3,7 @@
     device -> hello                       once per connection; names the recording
     server -> welcome {next_seq}          where to go on
     device -> curve.start, samples, node, curve.end     each numbered by `seq`: 0, 1, 2, ... within the recording
+              or reading, where the device is an array of sensors
     server -> ack {seq}                   everything up to and including seq is durable
     server -> error {code, message}       the connection closes after it
 
@@ -15,6 +16,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, TypeAdapter, model_validator
 
+from tracemesh.wire.arrays import ArrayReading, SensorArray
 from tracemesh.wire.base import PROTOCOL_VERSION, Count, Identifier, Message, Name, Quaternion, UnitQuaternion, Vector
 from tracemesh.wire.calibration import Calibration
 
@@ -55,6 +57,7 @@ class Device(Message):
     calibration: Calibration | None = Field(
         default=None, description="of this device, chosen by whoever records; the readings are as measured all the same"
     )
+    array: SensorArray | None = Field(default=None, description="present when the device is a fixed array of sensors")
 
     @model_validator(mode="after")
     def _calibrated_itself(self) -> Self:
@@ -180,10 +183,12 @@ class ErrorMessage(Message):
     expected_seq: Count | None = Field(default=None, description="with `gap`: the number that was wanted")
 
 
-Recorded = Annotated[CurveStart | Samples | NodeMark | CurveEnd, Field(discriminator="type")]
+OfCurve = CurveStart | Samples | NodeMark | CurveEnd
+"""What a device that slides along curves sends."""
+Recorded = Annotated[OfCurve | ArrayReading, Field(discriminator="type")]
 """What a recording consists of after its hello."""
-FromDevice = Annotated[Hello | CurveStart | Samples | NodeMark | CurveEnd, Field(discriminator="type")]
+FromDevice = Annotated[Hello | OfCurve | ArrayReading, Field(discriminator="type")]
 ToDevice = Annotated[Welcome | Ack | ErrorMessage, Field(discriminator="type")]
 
-from_device: TypeAdapter[Hello | CurveStart | Samples | NodeMark | CurveEnd] = TypeAdapter(FromDevice)
+from_device: TypeAdapter[Hello | OfCurve | ArrayReading] = TypeAdapter(FromDevice)
 to_device: TypeAdapter[Welcome | Ack | ErrorMessage] = TypeAdapter(ToDevice)

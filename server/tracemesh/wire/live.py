@@ -31,7 +31,7 @@ class LiveDevice(Message):
     kind: str
     name: str
     state: Literal["live", "stale", "lost"]
-    rate: float = Field(ge=0, description="samples per second, measured over the last second")
+    rate: float = Field(ge=0, description="samples, or readings of an array, per second, over the last second")
     age: float = Field(ge=0, description="s since the last sample arrived")
     jitter: float | None = Field(
         default=None, ge=0, description="s, standard deviation of the time between its last samples"
@@ -39,6 +39,20 @@ class LiveDevice(Message):
     acceleration_norm: float | None = Field(default=None, description="mean of |acceleration|, the device's own unit")
     magnetic_norm: float | None = Field(default=None, description="mean of |magnetic|, the device's own unit")
     dip: float | None = Field(default=None, description="rad, angle of the field below the horizontal")
+
+
+class LiveReading(Message):
+    """The network of one reading of a fixed array; a newer one of the same recording replaces it.
+
+    Its curves are numbered as in the array's declaration, its nodes as their sensors.
+    """
+
+    type: Literal["live.reading"] = "live.reading"
+    recording: Identifier
+    number: Count = Field(description="of the reading within the session")
+    time: float = Field(description="s, the device's own clock")
+    curves: list[LiveCurve]
+    nodes: list[NodePosition]
 
 
 class Snapshot(Message):
@@ -49,6 +63,7 @@ class Snapshot(Message):
     curves: list[LiveCurve]
     nodes: list[NodePosition]
     devices: list[LiveDevice] = Field(default=[])
+    readings: list[LiveReading] = Field(default=[], description="the newest one of every array that has one")
     reconstruction: Reconstruction | None = None
 
 
@@ -109,10 +124,8 @@ class LiveReconstruction(Message):
     reconstruction: Reconstruction
 
 
-ToBrowser = Annotated[
-    Snapshot | LiveCurveStart | LivePoints | LiveNode | LiveCurveEnd | LiveNetwork | LiveDevice | LiveReconstruction,
-    Field(discriminator="type"),
-]
-to_browser: TypeAdapter[
-    Snapshot | LiveCurveStart | LivePoints | LiveNode | LiveCurveEnd | LiveNetwork | LiveDevice | LiveReconstruction
-] = TypeAdapter(ToBrowser)
+Change = (
+    LiveCurveStart | LivePoints | LiveNode | LiveCurveEnd | LiveNetwork | LiveReading | LiveDevice | LiveReconstruction
+)
+ToBrowser = Annotated[Snapshot | Change, Field(discriminator="type")]
+to_browser: TypeAdapter[Snapshot | Change] = TypeAdapter(ToBrowser)

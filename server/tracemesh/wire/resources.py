@@ -34,6 +34,7 @@ class Session(Message):
     curves: Count
     samples: Count
     nodes: Count = Field(description="distinct node numbers marked")
+    readings: Count = Field(default=0, description="of fixed arrays")
     latest_reconstruction: Identifier | None = Field(default=None, description="newest one that is done")
 
 
@@ -132,6 +133,14 @@ class NodeProposals(Message):
     unplaced: list[Count] = Field(description="curves of which nothing is known: no place was found for them")
 
 
+class Readings(Message):
+    """GET /sessions/{session}/readings: when the readings of fixed arrays were taken."""
+
+    count: Count = Field(description="of all readings of the session; they are numbered 0, 1, 2, ...")
+    first: Count = Field(description="number of the reading to which the first of `times` belongs")
+    times: list[float] = Field(description="s, the device's own clock")
+
+
 class RecordingSummary(Message):
     """A recording of a session: what one device sent, or one uploaded file."""
 
@@ -172,6 +181,9 @@ class ReconstructionParameters(Message):
     )
     soft: bool = Field(default=False, description="let the surface leave a noisy network a little")
     surface: bool = Field(default=True, description="also span the surface, not only the network")
+    reading: Count | None = Field(
+        default=None, description="of a fixed array: number of the reading within the session; none: the last one"
+    )
 
 
 class CurveEdit(Message):

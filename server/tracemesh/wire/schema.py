@@ -9,7 +9,7 @@ import sys
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from tracemesh.wire import access, calibration, device, live, resources
+from tracemesh.wire import access, arrays, calibration, device, live, resources
 
 
 def browser_schema() -> dict[str, object]:
@@ -17,7 +17,7 @@ def browser_schema() -> dict[str, object]:
     models: list[type[BaseModel]] = sorted(
         {
             m
-            for module in (access, calibration, device, live, resources)
+            for module in (access, arrays, calibration, device, live, resources)
             for m in vars(module).values()
             if isinstance(m, type) and issubclass(m, BaseModel) and m.__module__ == module.__name__
         },

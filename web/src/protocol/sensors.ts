@@ -41,6 +41,7 @@ export const motionSensors: Source = {
     mounting: [0.5, 0.5, 0.5, 0.5],
     reference: REFERENCE,
     calibration: null,
+    array: null,
   },
   missing,
   start: startSensor,

@@ -36,6 +36,7 @@ export const morphorider: Source = {
     mounting: [1, 0, 0, 0],
     reference: REFERENCE,
     calibration: null,
+    array: null,
   },
   missing: (window) => ("serial" in window.navigator ? "" : "This browser cannot open serial ports; Chrome can."),
   start: startMorphorider,

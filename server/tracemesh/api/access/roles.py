@@ -63,6 +63,8 @@ TABLE: dict[tuple[str, str], Need | None] = {
     ("POST", SESSION + "/recordings"): RECORD,
     ("GET", SESSION + "/recordings/{recording}"): LOOK,
     ("PATCH", SESSION + "/recordings/{recording}"): EDIT,
+    ("GET", SESSION + "/readings"): LOOK,
+    ("GET", SESSION + "/readings/{number}"): LOOK,
     ("GET", SESSION + "/node-proposals"): EDIT,
     ("GET", SESSION + "/problems"): LOOK,
     ("POST", SESSION + "/preview"): EDIT,

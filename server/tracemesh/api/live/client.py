@@ -14,15 +14,20 @@ class Client:
         """A client that needs the present state first."""
         self.behind = True
         self.ended = False
-        self._queue: deque[str] = deque()
+        self._queue: deque[tuple[str, str]] = deque()
         self._wake = asyncio.Event()
         self._wake.set()
 
-    def push(self, text: str) -> None:
-        """Queue a message, or drop everything in favour of a new snapshot."""
+    def push(self, text: str, replaces: str = "") -> None:
+        """Queue a message, or drop everything in favour of a new snapshot.
+
+        `replaces`: what the message is the newest of; an older one that still waits is not sent any more.
+        """
         if self.behind:
             return
-        self._queue.append(text)
+        if replaces:
+            self._queue = deque(waiting for waiting in self._queue if waiting[0] != replaces)
+        self._queue.append((replaces, text))
         if len(self._queue) > MAX_QUEUE:
             self.need_snapshot()
         self._wake.set()
@@ -45,4 +50,4 @@ class Client:
 
     def pop(self) -> str | None:
         """The next message, if any."""
-        return self._queue.popleft() if self._queue else None
+        return self._queue.popleft()[1] if self._queue else None

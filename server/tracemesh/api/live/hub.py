@@ -8,13 +8,17 @@ from concurrent.futures.process import BrokenProcessPool
 
 from tracemesh.api.live.client import Client
 from tracemesh.api.live.meter import Meter
-from tracemesh.api.live.room import Room
+from tracemesh.api.live.room import Room, Stored
 from tracemesh.api.live.tracker import Accepted, SessionTracker
+from tracemesh.errors import TracemeshError
 from tracemesh.jobs.attached import SolvedNetwork, solve_attached
+from tracemesh.jobs.readings import SolvedReading, draw_reading
 from tracemesh.jobs.slot import Slot
 from tracemesh.storage.database import Database
+from tracemesh.storage.readings import StoredReading, newest_readings
 from tracemesh.storage.reconstructions import list_reconstructions
 from tracemesh.storage.states import RecordingState
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.device import Recorded, Samples
 from tracemesh.wire.resources import Reconstruction
 
@@ -32,6 +36,7 @@ class Hub:
         self._rooms: dict[str, Room] = {}
         self._meters: dict[str, dict[int, Meter]] = defaultdict(dict)
         self._slot = Slot()
+        self._array_slot = Slot()
         self._one_at_a_time = asyncio.Lock()
 
     @property
@@ -46,6 +51,7 @@ class Hub:
                 client.end()
             await room.close()
         await asyncio.to_thread(self._slot.close)
+        await asyncio.to_thread(self._array_slot.close)
 
     def connected(self, state: RecordingState) -> None:
         """A device begins to send."""
@@ -60,11 +66,15 @@ class Hub:
     def accepted(self, state: RecordingState, message: Recorded) -> None:
         """Show a message that the recorder took; costs next to nothing while nobody watches."""
         meter = self._meters.get(state.session.id, {}).get(state.key)
-        if meter is not None and isinstance(message, Samples):
+        if meter is not None and isinstance(message, Samples | ArrayReading):
             meter.add(message)
-        room = self._rooms.get(state.session.id)
-        if room is not None:
-            room.take(Accepted(state.key, state.hello.device, state.curves[message.curve].index, message))
+        room, device = self._rooms.get(state.session.id), state.hello.device
+        if room is None:
+            return
+        if isinstance(message, ArrayReading):
+            room.show(StoredReading(state.session.next_reading - 1, state.hello.recording, device, message))
+        else:
+            room.take(Accepted(state.key, device, state.curves[message.curve].index, message))
 
     def edited(self, session: str) -> None:
         """Curves or marks of a session were edited."""
@@ -79,7 +89,7 @@ class Hub:
     def join(self, session: str) -> tuple[Room, Client]:
         """Somebody watches."""
         if session not in self._rooms or self._rooms[session].stopped:
-            self._rooms[session] = Room(session, self._meters[session], self._load, self._solve)
+            self._rooms[session] = Room(session, self._meters[session], self._load, self._solve, self._draw)
         room, client = self._rooms[session], Client()
         room.clients.add(client)
         return room, client
@@ -97,13 +107,14 @@ class Hub:
         if kept:
             self._meters[session] = kept
 
-    async def _load(self, session: str) -> tuple[SessionTracker, Reconstruction | None]:
+    async def _load(self, session: str) -> Stored:
         await self._flush()  # what comes from now on is in the room's hands
 
-        def read() -> tuple[SessionTracker, Reconstruction | None]:
+        def read() -> Stored:
             with self._database.read() as transaction:
                 tracker = SessionTracker.load(transaction, session)
-                return tracker, next(iter(list_reconstructions(transaction, session)), None)
+                reconstruction = next(iter(list_reconstructions(transaction, session)), None)
+                return Stored(tracker, reconstruction, newest_readings(transaction, session))
 
         await self._flush()  # what was accepted before somebody watched is told to nobody: it must be in the database
         return await asyncio.to_thread(read)
@@ -119,3 +130,14 @@ class Hub:
             except Exception:
                 log.exception("session %s: the network could not be solved; its curves are drawn as reckoned", session)
             return None
+
+    async def _draw(self, stored: StoredReading) -> SolvedReading | None:
+        """In a process that does nothing else: an array's rate does not wait for other networks."""
+        device = stored.device.model_dump_json()
+        try:
+            return await asyncio.wrap_future(self._array_slot.submit(draw_reading, device, stored.reading))
+        except BrokenProcessPool:
+            self._array_slot.renew()
+        except TracemeshError as error:
+            log.info("recording %s cannot be drawn: %s", stored.recording, error)
+        return None

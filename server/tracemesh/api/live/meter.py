@@ -7,6 +7,7 @@ import numpy as np
 
 from tracemesh.geometry.scan import Floats
 from tracemesh.geometry.sensing.orientation import angles_between
+from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.device import Hello, Samples
 from tracemesh.wire.live import LiveDevice
 
@@ -24,13 +25,13 @@ class Meter:
         self._hello = hello
         self._began = self._last = monotonic()
         self._arrivals: deque[tuple[float, int]] = deque(maxlen=1000)
-        self._block: Samples | None = None
+        self._block: Samples | ArrayReading | None = None
         self.connected = True
 
-    def add(self, block: Samples) -> None:
-        """A block arrived now."""
+    def add(self, block: Samples | ArrayReading) -> None:
+        """A block of samples, or one reading of an array, arrived now."""
         self._last = monotonic()
-        self._arrivals.append((self._last, block.count))
+        self._arrivals.append((self._last, block.count if isinstance(block, Samples) else 1))
         self._block = block
 
     def read(self) -> LiveDevice:
@@ -60,9 +61,9 @@ class Meter:
         return acceleration, magnetic
 
 
-def _jitter(block: Samples | None) -> float | None:
-    """By the device's clock if it has one."""
-    if block is None:
+def _jitter(block: Samples | ArrayReading | None) -> float | None:
+    """By the device's clock if it has one; a single reading tells nothing."""
+    if not isinstance(block, Samples):
         return None
     times = block.received if block.time is None else block.time
     return None if times is None or len(times) < 3 else float(np.std(np.diff(times)))

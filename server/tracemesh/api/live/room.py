@@ -3,16 +3,21 @@
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from time import monotonic
 
 from pydantic import BaseModel
 
 from tracemesh.api.live.client import Client
 from tracemesh.api.live.meter import Meter
+from tracemesh.api.live.readings import live_reading
 from tracemesh.api.live.tracker import Accepted, SessionTracker
 from tracemesh.errors import NotFound
 from tracemesh.jobs.attached import SolvedNetwork
+from tracemesh.jobs.readings import SolvedReading
+from tracemesh.storage.readings import StoredReading
 from tracemesh.wire.device import CurveEnd, NodeMark
-from tracemesh.wire.live import LiveReconstruction, Snapshot
+from tracemesh.wire.live import LiveReading, LiveReconstruction, Snapshot
 from tracemesh.wire.resources import Reconstruction
 
 FRAME = 1 / 60
@@ -24,6 +29,15 @@ MAX_PENDING = 20_000
 log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class Stored:
+    """A session as it is in the database; `readings`: the newest one of every array."""
+
+    tracker: SessionTracker
+    reconstruction: Reconstruction | None
+    readings: list[StoredReading]
+
+
 class Room:
     """Lives while somebody watches."""
 
@@ -31,24 +45,33 @@ class Room:
         self,
         session: str,
         meters: dict[int, Meter],
-        load: Callable[[str], Awaitable[tuple[SessionTracker, Reconstruction | None]]],
+        load: Callable[[str], Awaitable[Stored]],
         solve: Callable[[str], Awaitable[SolvedNetwork | None]],
+        draw: Callable[[StoredReading], Awaitable[SolvedReading | None]],
     ) -> None:
-        """`meters`: of the session's devices, kept by the caller; `load` and `solve` read what is committed."""
+        """`meters`: of the session's devices, kept by the caller; `load` and `solve` read what is committed.
+
+        `draw`: solves a reading of an array.
+        """
         self.session = session
         self.clients: set[Client] = set()
         self.stopped = False
         self._meters = meters
         self._load = load
         self._solve = solve
+        self._draw_reading = draw
         self._tracker = SessionTracker()
         self._reconstruction: Reconstruction | None = None
         self._pending: list[Accepted] = []
+        self._newest: dict[str, StoredReading] = {}
+        self._drawn: dict[str, LiveReading] = {}
         self._stale = True
         self._changed = asyncio.Event()
         self._unsolved = asyncio.Event()
+        self._undrawn = asyncio.Event()
         self._loaded = asyncio.Event()
-        self._tasks = [asyncio.create_task(self._guard(work)) for work in (self._draw, self._settle, self._tell_health)]
+        works = (self._draw, self._settle, self._draw_readings, self._tell_health)
+        self._tasks = [asyncio.create_task(self._guard(work)) for work in works]
 
     async def close(self) -> None:
         """Nobody watches any more."""
@@ -62,6 +85,13 @@ class Room:
         if len(self._pending) > MAX_PENDING:
             self.reload()
         self._changed.set()
+
+    def show(self, reading: StoredReading) -> None:
+        """An array was read: drawn as soon as the one before it is, unless a newer one comes meanwhile."""
+        drawn = self._drawn.get(reading.recording)
+        if drawn is None or drawn.number < reading.number:
+            self._newest[reading.recording] = reading
+            self._undrawn.set()
 
     def reload(self) -> None:
         """What is stored was edited: read it again."""
@@ -83,13 +113,14 @@ class Room:
             curves=network.curves,
             nodes=network.nodes,
             devices=[meter.read() for meter in self._meters.values()],
+            readings=list(self._drawn.values()),
             reconstruction=self._reconstruction,
         ).model_dump_json()
 
-    def _broadcast(self, message: BaseModel) -> None:
+    def _broadcast(self, message: BaseModel, replaces: str = "") -> None:
         text = message.model_dump_json()
         for client in self.clients:
-            client.push(text)
+            client.push(text, replaces)
 
     async def _draw(self) -> None:
         while True:
@@ -107,9 +138,13 @@ class Room:
     async def _read_again(self) -> None:
         self._stale = False
         told = self._reconstruction
-        self._tracker, stored = await self._load(self.session)
+        stored = await self._load(self.session)
+        self._tracker = stored.tracker
         if self._reconstruction is told:  # else there was news while reading
-            self._reconstruction = stored
+            self._reconstruction = stored.reconstruction
+        for reading in stored.readings:
+            if reading.recording not in self._newest:  # else a newer one came while reading
+                self.show(reading)
         self._loaded.set()
         self._unsolved.set()
         for client in self.clients:
@@ -124,6 +159,20 @@ class Room:
             solved = await self._solve(self.session)
             if solved is not None and tracker is self._tracker and not self._stale:
                 self._broadcast(tracker.settle(solved))
+
+    async def _draw_readings(self) -> None:
+        """The newest reading of every array, one solution at a time."""
+        while True:
+            await self._undrawn.wait()
+            self._undrawn.clear()
+            began = monotonic()
+            newest, self._newest = self._newest, {}
+            for stored in newest.values():
+                solved = await self._draw_reading(stored)
+                if solved is not None:
+                    self._drawn[stored.recording] = drawn = live_reading(stored, solved)
+                    self._broadcast(drawn, replaces=stored.recording)
+            await asyncio.sleep(max(0.0, began + FRAME - monotonic()))
 
     async def _tell_health(self) -> None:
         while True:

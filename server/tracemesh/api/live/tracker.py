@@ -14,7 +14,7 @@ from tracemesh.storage.curves import curve_rows, marks_of
 from tracemesh.storage.devices import corrected_hello
 from tracemesh.storage.models import RecordingRow
 from tracemesh.storage.scans import sample_blocks
-from tracemesh.wire.device import CurveEnd, CurveStart, Device, NodeMark, Recorded, Samples
+from tracemesh.wire.device import CurveEnd, CurveStart, Device, NodeMark, OfCurve, Samples
 from tracemesh.wire.live import LiveCurve, LiveCurveEnd, LiveCurveStart, LiveNetwork, LiveNode, LivePoints
 from tracemesh.wire.resources import NodePosition
 
@@ -28,7 +28,7 @@ class Accepted:
     key: int
     device: Device
     index: int
-    message: Recorded
+    message: OfCurve
 
 
 class SessionTracker:
@@ -119,7 +119,7 @@ class SessionTracker:
         recordings = transaction.scalars(select(RecordingRow).where(RecordingRow.session_id == session)).all()
         tracker._next_seq = {row.key: row.next_seq for row in recordings}
         devices = {row.key: corrected_hello(transaction, row).device for row in recordings}
-        blocks = {key: sample_blocks(transaction, key) for key in devices}
+        blocks = {key: sample_blocks(transaction, key) for key, device in devices.items() if device.array is None}
         for row in curve_rows(transaction, session):
             drawing = CurveDrawing(devices[row.recording_key], row.boundary)
             drawing.closed, drawing.ended = row.closed, row.ended

@@ -37,11 +37,13 @@ def _normals(layout: Layout, frames: Floats) -> Floats:
     return normals
 
 
-def assemble_network(layout: Layout, points: Floats, frames: Floats, uncertainty: Floats, curves: Ints) -> CurveNetwork:
+def assemble_network(
+    layout: Layout, points: Floats, frames: Floats, uncertainty: Floats | None, curves: Ints
+) -> CurveNetwork:
     """Network of points (n, 3), m, and frames (n, 3, 3) at a layout's rows.
 
-    uncertainty: (p,) m, of the network's points. curves: (c,) index of each in the scan. The place where a closed curve
-    without nodes was started is no node of the network.
+    uncertainty: (p,) m, of the network's points, if known. curves: (c,) index of each in the scan. The place where a
+    closed curve without nodes was started is no node of the network.
     """
     point = point_of_row(layout)
     segments = []
