@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from benchmarks.accuracy import network_error
 from benchmarks.data import noisy_scan
 from benchmarks.measuring import Floats, paired_motion
-from benchmarks.nodes import TOLERANCE, marked_meetings, match_errors, proposed_meetings, without_marks
+from benchmarks.nodes import TOLERANCE, marked_meetings, matches, proposed_meetings, without_marks
 from benchmarks.noisy import partners
 from benchmarks.pictures.canvas import BLUE, CURVES, GREEN, GREY, INK, ORANGE, Axes, draw_network, figure, plane, space
 from benchmarks.regression import regression_problem
@@ -221,7 +221,7 @@ def _sureness(scan: Scan) -> Floats:
     rows, true, most = [], marked_meetings(scan), 1.5 * TOLERANCE
     for proposal in infer_nodes(without_marks(scan)).proposals:
         for meeting in proposed_meetings(scan, InferredNodes((proposal,), ())):
-            errors = match_errors(scan, true, [meeting])
+            errors = list(matches(scan, true, [meeting]).values())
             rows.append((proposal.confidence, 1e3 * (errors[0] if errors else most)))
     return np.array(rows)
 

@@ -104,8 +104,8 @@ def test_given_lengths_are_those_between_nodes() -> None:
 
 
 def test_nodes() -> None:
-    table = nodes.nodes(WITHOUT, ("leaf",))
-    assert [row[0] for row in table.rows] == ["leaf (built in), noisy", "all"]
+    table = nodes.nodes(WITHOUT, ("leaf",), 1)
+    assert [row[0] for row in table.rows] == ["leaf (built in), 1 scans", "all"]
     assert table.rows[0][1:] == table.rows[1][1:]
     assert 0.5 < float(table.rows[0][5] or 0) <= 1
 
@@ -113,13 +113,13 @@ def test_nodes() -> None:
 def test_meetings_are_matched_once_and_round_closed_curves() -> None:
     scan = exact_scan(leaf(), 0.01)
     true = nodes.marked_meetings(scan)
-    assert nodes.match_errors(scan, true, true) == [0.0] * len(true)
+    assert nodes.matches(scan, true, true) == dict.fromkeys(true, 0.0)
     first = true[0]
     assert scan.curves[first.curves[0]].closed
     length = float(np.ptp(scan.curves[first.curves[0]].distance))
     round_once = nodes.Meeting(first.curves, (first.places[0] - length + 0.01, first.places[1]))
-    assert nodes.match_errors(scan, [first, first], [round_once]) == pytest.approx([0.01])
-    assert nodes.match_errors(scan, [first], [nodes.Meeting((0, 99), first.places)]) == []
+    assert nodes.matches(scan, [first, first], [round_once]) == pytest.approx({round_once: 0.01})
+    assert nodes.matches(scan, [first], [nodes.Meeting((0, 99), first.places)]) == {}
 
 
 def test_partners_of_an_exact_network_are_its_points() -> None:

@@ -18,6 +18,8 @@ NORMAL = float(np.radians(1.5))
 """rad, standard deviation of a smoothed normal."""
 _KNOWN = 0.001
 """m, standard deviation of a place that is known: an end of an open curve, a marked sample."""
+_CAUTION = 0.5
+"""Standard deviation of places over the one that those above make: they leave room for what is not modelled."""
 _LARGEST_STEP = 0.02
 _SETTLED = 1e-5
 _ROUNDS = 30
@@ -28,7 +30,8 @@ _DAMPING = 1e-6
 class Contact:
     """Curve a at arc length s touches curve b at arc length t (m).
 
-    confidence: 0 to 1. known_s, known_t: the place is known beforehand. node: its number, if it was marked.
+    confidence: 0 to 1. known_s, known_t: the place is known beforehand. node: its number, if it was marked. spread: m,
+    standard deviation of its place in the joint solution, on the curve where it is larger.
     """
 
     a: int
@@ -39,6 +42,7 @@ class Contact:
     known_s: bool = False
     known_t: bool = False
     node: int | None = None
+    spread: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -72,9 +76,14 @@ def settle(curves: Sequence[FloatingCurve], poses: dict[int, Pose], contacts: Se
             break
     residual = system.linearised(unknowns)[0][: 6 * len(contacts)]
     turns, places = unknowns[: 4 * len(placed)].reshape(-1, 4), unknowns[4 * len(placed) :].reshape(-1, 2)
+    variances = np.diag(np.linalg.inv(hessian + _DAMPING * np.diag(np.diag(hessian))))[4 * len(placed) :]
+    spread = _CAUTION * np.sqrt(variances).reshape(-1, 2).max(axis=1)
     return Settled(
         {index: Pose(float(row[0]), row[1:].copy()) for index, row in zip(placed, turns, strict=True)},
-        tuple(replace(c, s=float(s), t=float(t)) for c, (s, t) in zip(contacts, places, strict=True)),
+        tuple(
+            replace(c, s=float(s), t=float(t), spread=float(d))
+            for c, (s, t), d in zip(contacts, places, spread, strict=True)
+        ),
         np.sum(residual.reshape(-1, 6) ** 2, axis=1),
     )
 

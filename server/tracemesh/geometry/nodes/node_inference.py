@@ -7,6 +7,7 @@ one joint solution corrects all places.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import erf
 
 import numpy as np
 
@@ -32,9 +33,10 @@ _ROUNDS = 2
 
 @dataclass(frozen=True)
 class NodeProposal:
-    """One node. places: (curve, sample) on each of its curves, both counted from 0. confidence: 0 to 1.
+    """One node. places: (curve, sample) on each of its curves, both counted from 0.
 
-    node: its number if it was marked before, else None.
+    confidence: 0 to 1, that it is one, and within 20 mm of these places. node: its number if it was marked
+    before, else None.
     """
 
     places: tuple[tuple[int, int], ...]
@@ -252,7 +254,13 @@ def _proposal(scan: Scan, curves: Sequence[FloatingCurve], group: Sequence[Conta
         clusters[-1][1].append(arc)
     places = [(i, _sample(scan.curves[i], curves[i], arcs)) for i, arcs in clusters]
     numbers = [c.node for c in group if c.node is not None]
-    return NodeProposal(tuple(places), min(c.confidence for c in group), min(numbers, default=None))
+    confidence = min(c.confidence * _share_within(c.spread) for c in group)
+    return NodeProposal(tuple(places), confidence, min(numbers, default=None))
+
+
+def _share_within(spread: float) -> float:
+    """Probability that a place with a standard deviation, m, is not further off than a mark is looked for."""
+    return erf(_MARKED / (spread * 2**0.5)) if spread else 1.0
 
 
 def _sample(scanned: CurveScan, curve: FloatingCurve, arcs: Sequence[float]) -> int:
