@@ -1,0 +1,70 @@
+"""On every size that people have, no panel covers another and the view is never blank."""
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.web.support import Rider, Server, share_of_pixels
+
+SIZES = {"laptop": (1280, 720), "small": (1024, 768), "tablet": (820, 1180), "desk": (1920, 1080), "phone": (390, 780)}
+PANELS = "header, aside, main, .strip"
+FLOATING = "main > .tools, main > figure, main > .problem, main > .scale"
+
+
+@pytest.fixture(scope="module")
+def leaf_session(server: Server) -> dict[str, str]:
+    """Filled by the first test that needs it."""
+    return {}
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_nothing_covers_anything(
+    server: Server, page: Page, rider: Callable[[str], Rider], leaf_session: dict[str, str], size: str
+) -> None:
+    if not leaf_session:
+        leaf_session["id"] = server.call("POST", "/sessions", {"name": "A leaf with quite a long name"})["id"]
+        rider(leaf_session["id"]).ride(lambda m: False)
+        leaf_session["empty"] = server.call("POST", "/sessions", {"name": ""})["id"]
+        server.call("POST", f"/sessions/{leaf_session['id']}/reconstructions", {})
+    width, height = SIZES[size]
+    page.set_viewport_size({"width": width, "height": height})
+
+    page.goto(server.page())
+    expect(page.get_by_role("link", name="A leaf with quite a long name")).to_be_visible()
+    _check(page, width)
+    page.goto(server.page(f"#/sessions/{leaf_session['empty']}"))
+    expect(page.get_by_text("Nothing scanned yet.")).to_be_visible()
+    _check(page, width)
+
+    page.goto(server.page(f"#/sessions/{leaf_session['id']}"))
+    view = page.locator("main > canvas")
+    expect(view).to_have_attribute("data-surface", "shown")
+    expect(page.get_by_role("button", name="5 interior")).to_be_visible()
+    _check(page, width)
+    for key in ("e", "]", ".", "b", "p"):  # all that may be open at once
+        page.keyboard.press(key)
+    expect(page.get_by_role("img", name="Gauss map")).to_be_visible()
+    expect(page.get_by_role("heading", name="Curvature along curve")).to_be_visible()
+    expect(page.get_by_role("slider", name="Place on curve 1")).to_be_visible()
+    _check(page, width)
+    page.keyboard.press("0")
+    page.wait_for_timeout(300)
+    boundary, background = share_of_pixels(view, "curve-boundary", "view")
+    assert boundary > 0.0005
+    assert background < 0.995
+
+
+def _check(page: Page, width: int) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for group in (PANELS, FLOATING):
+        boxes = [box for part in page.locator(group).all() if (box := part.bounding_box())]
+        assert all(b["x"] >= -0.5 and b["x"] + b["width"] <= width + 0.5 for b in boxes)
+        assert not [(a, b) for i, a in enumerate(boxes) for b in boxes[i + 1 :] if _overlap(a, b)]
+
+
+def _overlap(a: dict[str, float], b: dict[str, float]) -> bool:
+    def shared(start: str, size: str) -> float:
+        return min(a[start] + a[size], b[start] + b[size]) - max(a[start], b[start])
+
+    return shared("x", "width") > 1 and shared("y", "height") > 1
