@@ -13,10 +13,8 @@ from tracemesh.settings import Settings
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "api.md").read_text()
 
 
-def example(language: str) -> str:
-    found = re.search(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None
-    return found[1]
+def examples(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
 
 
 @pytest.fixture
@@ -29,12 +27,14 @@ def base(server: Any, shared_data: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_the_python_example_makes_a_mesh(base: str) -> None:
     names: dict[str, Any] = {"server": base}
-    exec(example("python"), names)
+    for example in examples("python"):
+        exec(example, names)
     assert names["mesh"][:4] == b"glTF"
+    assert len(names["results"].namelist()) == 6
 
 
 def test_the_curl_example_queues_a_job(base: str, server: Any) -> None:
-    script = f"set -e\nserver={base}\n{example('sh')}"
+    script = f"set -e\nserver={base}\n{examples('sh')[0]}"
     subprocess.run(["sh", "-c", script], check=True, stdout=subprocess.DEVNULL)
     assert len(server.http.get("/sessions/lamp/reconstructions").json()) == 1
 

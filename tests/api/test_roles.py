@@ -29,6 +29,8 @@ VIEWER = {
     ("GET", "/api/v1/sessions/{session}/curves/{index}"),
     ("GET", "/api/v1/sessions/{session}/recordings"),
     ("GET", "/api/v1/sessions/{session}/recordings/{recording}"),
+    ("GET", "/api/v1/sessions/{session}/readings"),
+    ("GET", "/api/v1/sessions/{session}/readings/{number}"),
     ("GET", "/api/v1/sessions/{session}/reconstructions"),
     ("GET", "/api/v1/reconstructions/{reconstruction}"),
     ("GET", "/api/v1/reconstructions/{reconstruction}/{name}"),
@@ -41,6 +43,10 @@ SURVEY = {
     ("GET", "/api/v1/devices/{device}"),
     ("GET", "/api/v1/devices/{device}/calibrations"),
     ("GET", "/api/v1/devices/{device}/calibrations/{version}"),
+    ("GET", "/api/v1/batches"),
+    ("GET", "/api/v1/batches/{batch}"),
+    ("GET", "/api/v1/batches/{batch}/reconstructions"),
+    ("GET", "/api/v1/batches/{batch}/results"),
 }
 """What a viewer of the whole server may do besides."""
 DEVICE = VIEWER | {("POST", "/api/v1/sessions/{session}/recordings"), ("SOCKET", "/api/v1/ingest")}
@@ -166,6 +172,8 @@ def test_the_owner_of_a_session_does_everything_with_it_but_nothing_with_the_ser
         ("GET", "/metrics"),
         ("POST", "/api/v1/sessions"),
         ("POST", "/api/v1/sessions/archive"),
+        ("POST", "/api/v1/batches"),
+        ("POST", "/api/v1/batches/{batch}/cancel"),
         ("POST", "/api/v1/devices/{device}/calibrations"),
         ("DELETE", "/api/v1/devices/{device}/calibrations/{version}"),
     }

@@ -62,6 +62,27 @@ export interface ArrayReading {
   type: "reading";
 }
 /**
+ * Many scans that were sent at once, each with a reconstruction of its own; and how many are in which state.
+ */
+export interface Batch {
+  cancelled: number;
+  created: string;
+  done: number;
+  failed: number;
+  /**
+   * of all its work
+   */
+  fraction: number;
+  id: string;
+  name: string;
+  queued: number;
+  running: number;
+  /**
+   * scans; those that no state counts are being taken in, or their session was deleted
+   */
+  size: number;
+}
+/**
  * One calibration of one device.
  */
 export interface Calibration {
@@ -590,6 +611,10 @@ export interface Reconstruction {
   artifacts: {
     [k: string]: string;
   };
+  /**
+   * it was sent with others, and comes after what is waited for
+   */
+  batch: string | null;
   created: string;
   /**
    * why it failed, in words for people

@@ -24,6 +24,7 @@ from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
 from tracemesh.api.routes import (
     archives,
+    batches,
     comparisons,
     curves,
     devices,
@@ -81,6 +82,7 @@ def create_app(settings: Settings) -> FastAPI:
     api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
     routes = (
         archives,
+        batches,
         sessions,
         curves,
         recordings,

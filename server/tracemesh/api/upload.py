@@ -1,19 +1,28 @@
 """Files taken in as if a device had sent them, through the same recorder."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import IO
 
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
 from tracemesh.api.recorder import Recorder
+from tracemesh.api.services import Services
 from tracemesh.errors import InputError, NotFound, Refused
+from tracemesh.formats.networks import read_network
 from tracemesh.formats.rawnet import read_rawnet
 from tracemesh.formats.recordings import read_recording, recording_from_scan, write_recording
 from tracemesh.formats.scans import is_recording
+from tracemesh.storage.reconstructions import create_reconstruction, give_artifact
 from tracemesh.storage.states import RecordingState, SessionState
 from tracemesh.wire.device import Hello, Recorded
+from tracemesh.wire.resources import Reconstruction, ReconstructionParameters
 
 CHUNK = 500
 """Messages between two waits for the disk."""
+SPOOLED = 2**24
+"""Bytes of a file that stay in memory; larger ones go to a temporary file."""
 
 
 def file_body(*media_types: str) -> dict[str, object]:
@@ -30,6 +39,24 @@ async def read_body(request: Request, limit: int) -> bytes:
         if len(content) > limit:
             raise InputError(f"wanted a file of at most {limit} bytes")
     return bytes(content)
+
+
+async def spool_body(request: Request, limit: int, file: IO[bytes]) -> None:
+    """Write the body of a request to a file as it comes; raises InputError when it has more than `limit` bytes."""
+    size = 0
+    async for chunk in request.stream():
+        size += len(chunk)
+        if size > limit:
+            raise InputError(f"wanted a file of at most {limit} bytes")
+        await run_in_threadpool(file.write, chunk)
+
+
+def chunks(file: IO[bytes]) -> Iterator[bytes]:
+    """A file from its beginning, closed at the end."""
+    with file:
+        file.seek(0)
+        while chunk := file.read(SPOOLED // 256):
+            yield chunk
 
 
 def utf8(content: bytes) -> str:
@@ -106,3 +133,16 @@ async def store_upload(recorder: Recorder, upload: Upload) -> None:
         await recorder.leave(state, sender)
     if sender.failure is not None:
         raise sender.failure
+
+
+def store_network(
+    services: Services, session: str, content: bytes, identifier: str | None = None, batch: str | None = None
+) -> Reconstruction:
+    """Queue the surface over a network that is known already; raises InputError, NotFound or Unavailable."""
+    text = utf8(content)
+    read_network(text)
+    stored = text.encode()
+    digest = services.artifacts.put(stored)
+    with services.database.write() as transaction:
+        made = create_reconstruction(transaction, session, ReconstructionParameters(), identifier, batch)
+        return give_artifact(transaction, made.id, "network.json", digest, len(stored))

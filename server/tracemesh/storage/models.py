@@ -181,6 +181,17 @@ class ReadingRow(Base):
     time: Mapped[float]
 
 
+class BatchRow(Base):
+    """Many scans that were sent at once."""
+
+    __tablename__ = "batches"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    name: Mapped[str] = mapped_column(String(200), default="")
+    size: Mapped[int]
+    created: Mapped[datetime] = mapped_column(UtcTime, default=now, index=True)
+
+
 class ReconstructionRow(Base):
     """A reconstruction of a session: this row is the job.
 
@@ -193,6 +204,7 @@ class ReconstructionRow(Base):
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     session_id: Mapped[str] = mapped_column(ForeignKey("sessions.id", ondelete="CASCADE"), index=True)
+    batch_id: Mapped[str | None] = mapped_column(String(64), index=True)
     state: Mapped[str] = mapped_column(String(16), default="queued")
     stage: Mapped[str] = mapped_column(String(200), default="")
     fraction: Mapped[float] = mapped_column(default=0.0)

@@ -11,7 +11,8 @@ from sqlalchemy import ColumnElement, func, select, update
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import Conflict, NotFound
-from tracemesh.storage.models import ArtifactRow, ReconstructionRow, new_id, now
+from tracemesh.storage.models import BATCH, INTERACTIVE, ArtifactRow, ReconstructionRow, new_id, now
+from tracemesh.storage.paging import newest_first
 from tracemesh.storage.sessions import session_row
 from tracemesh.wire.resources import JobState, Reconstruction, ReconstructionParameters
 
@@ -29,10 +30,15 @@ class Claim(NamedTuple):
 
 
 def create_reconstruction(
-    transaction: Transaction, session: str, parameters: ReconstructionParameters, identifier: str | None = None
+    transaction: Transaction,
+    session: str,
+    parameters: ReconstructionParameters,
+    identifier: str | None = None,
+    batch: str | None = None,
 ) -> Reconstruction:
     """A queued reconstruction of a session, or the one that has this identifier already.
 
+    One of a batch comes after those that somebody waits for.
     Raises NotFound, and Conflict when that one has other parameters.
     """
     session_row(transaction, session)
@@ -41,7 +47,13 @@ def create_reconstruction(
         if known.parameters != parameters.model_dump():
             raise Conflict("the same Idempotency-Key came with other parameters before")
         return describe(transaction, known)
-    row = ReconstructionRow(id=identifier or new_id(), session_id=session, parameters=parameters.model_dump())
+    row = ReconstructionRow(
+        id=identifier or new_id(),
+        session_id=session,
+        batch_id=batch,
+        priority=INTERACTIVE if batch is None else BATCH,
+        parameters=parameters.model_dump(),
+    )
     transaction.add(row)
     transaction.flush()
     return describe(transaction, row)
@@ -50,8 +62,9 @@ def create_reconstruction(
 def give_artifact(transaction: Transaction, identifier: str, name: str, digest: str, size: int) -> Reconstruction:
     """Let a reconstruction have a file before it runs: a network that is known already. Raises NotFound."""
     row = _row(transaction, identifier)
-    transaction.add(ArtifactRow(reconstruction_id=row.id, name=name, sha256=digest, size=size))
-    transaction.flush()
+    if transaction.get(ArtifactRow, (row.id, name)) is None:  # else the same request came before
+        transaction.add(ArtifactRow(reconstruction_id=row.id, name=name, sha256=digest, size=size))
+        transaction.flush()
     return describe(transaction, row)
 
 
@@ -60,12 +73,30 @@ def get_reconstruction(transaction: Transaction, identifier: str) -> Reconstruct
     return describe(transaction, _row(transaction, identifier))
 
 
-def list_reconstructions(transaction: Transaction, session: str) -> list[Reconstruction]:
-    """All reconstructions of a session, newest first; raises NotFound."""
-    session_row(transaction, session)
-    query = select(ReconstructionRow).where(ReconstructionRow.session_id == session)
-    newest_first = query.order_by(ReconstructionRow.created.desc(), ReconstructionRow.id.desc())
-    return [describe(transaction, row) for row in transaction.scalars(newest_first)]
+def list_reconstructions(
+    transaction: Transaction,
+    limit: int,
+    after: str | None = None,
+    *,
+    session: str | None = None,
+    batch: str | None = None,
+    state: JobState | None = None,
+) -> list[Reconstruction]:
+    """Reconstructions of a session, of a batch or in a state, newest first; `after` is the last of the page before.
+
+    Raises NotFound for an unknown one.
+    """
+    query = select(ReconstructionRow)
+    if session is not None:
+        session_row(transaction, session)
+        query = query.where(ReconstructionRow.session_id == session)
+    if batch is not None:
+        query = query.where(ReconstructionRow.batch_id == batch)
+    if state is not None:
+        query = query.where(ReconstructionRow.state == state)
+    last = None if after is None else _row(transaction, after)
+    page = newest_first(query, ReconstructionRow, last, limit)
+    return [describe(transaction, row) for row in transaction.scalars(page)]
 
 
 def request_cancel(transaction: Transaction, identifier: str) -> Reconstruction:
@@ -172,6 +203,7 @@ def describe(transaction: Transaction, row: ReconstructionRow) -> Reconstruction
     return Reconstruction(
         id=row.id,
         session=row.session_id,
+        batch=row.batch_id,
         state=row.state,
         stage=row.stage,
         fraction=row.fraction,

@@ -5,6 +5,7 @@ from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import Conflict, NotFound
 from tracemesh.storage.models import CurveRow, MarkRow, ReadingRow, ReconstructionRow, SessionRow, new_id
+from tracemesh.storage.paging import newest_first
 from tracemesh.wire.resources import Session, SessionCreate, SessionUpdate
 
 
@@ -24,14 +25,16 @@ def create_session(transaction: Transaction, wanted: SessionCreate, derived: str
     return _session(transaction, row)
 
 
-def list_sessions(transaction: Transaction, limit: int, after: str | None = None) -> list[Session]:
-    """Newest first; `after` is the last session of the page before. Raises NotFound for an unknown one."""
-    query = select(SessionRow).order_by(SessionRow.created.desc(), SessionRow.id.desc()).limit(limit)
-    if after is not None:
-        last = session_row(transaction, after)
-        same_time = (SessionRow.created == last.created) & (SessionRow.id < last.id)
-        query = query.where((SessionRow.created < last.created) | same_time)
-    return [_session(transaction, row) for row in transaction.scalars(query)]
+def list_sessions(transaction: Transaction, limit: int, after: str | None = None, name: str = "") -> list[Session]:
+    """Newest first, those whose name contains `name`; `after` is the last session of the page before.
+
+    Raises NotFound for an unknown one.
+    """
+    query = select(SessionRow)
+    if name:
+        query = query.where(SessionRow.name.icontains(name, autoescape=True))
+    last = None if after is None else session_row(transaction, after)
+    return [_session(transaction, row) for row in transaction.scalars(newest_first(query, SessionRow, last, limit))]
 
 
 def get_session(transaction: Transaction, identifier: str) -> Session:

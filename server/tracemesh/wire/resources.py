@@ -234,11 +234,31 @@ class PreviewWish(ReconstructionParameters):
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 
+class Batch(Message):
+    """Many scans that were sent at once, each with a reconstruction of its own; and how many are in which state."""
+
+    id: Identifier
+    name: str
+    created: datetime
+    size: Count = Field(
+        description="scans; those that no state counts are being taken in, or their session was deleted"
+    )
+    queued: Count
+    running: Count
+    done: Count
+    failed: Count
+    cancelled: Count
+    fraction: float = Field(ge=0, le=1, description="of all its work")
+
+
 class Reconstruction(Message):
     """A reconstruction of a session: a job, and its results once it is done."""
 
     id: Identifier
     session: Identifier
+    batch: Identifier | None = Field(
+        default=None, description="it was sent with others, and comes after what is waited for"
+    )
     state: JobState
     stage: str = Field(default="", description="what is being done, in words")
     fraction: float = Field(default=0.0, ge=0, le=1)

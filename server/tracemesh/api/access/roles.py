@@ -35,6 +35,7 @@ RULE = Need("owner", "server")
 
 SESSION = "/api/v1/sessions/{session}"
 CALIBRATIONS = "/api/v1/devices/{device}/calibrations"
+BATCH = "/api/v1/batches/{batch}"
 RECONSTRUCTION = "/api/v1/reconstructions/{reconstruction}"
 TABLE: dict[tuple[str, str], Need | None] = {
     ("GET", "/healthz"): OPEN,
@@ -74,6 +75,12 @@ TABLE: dict[tuple[str, str], Need | None] = {
     ("POST", RECONSTRUCTION + "/cancel"): EDIT,
     ("GET", RECONSTRUCTION + "/{name}"): LOOK,
     ("POST", RECONSTRUCTION + "/comparison"): EDIT,
+    ("POST", "/api/v1/batches"): RULE,
+    ("GET", "/api/v1/batches"): SURVEY,
+    ("GET", BATCH): SURVEY,
+    ("GET", BATCH + "/reconstructions"): SURVEY,
+    ("GET", BATCH + "/results"): SURVEY,
+    ("POST", BATCH + "/cancel"): RULE,
     ("GET", "/api/v1/devices"): SURVEY,
     ("GET", "/api/v1/devices/{device}"): SURVEY,
     ("GET", CALIBRATIONS): SURVEY,

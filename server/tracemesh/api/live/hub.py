@@ -113,7 +113,7 @@ class Hub:
         def read() -> Stored:
             with self._database.read() as transaction:
                 tracker = SessionTracker.load(transaction, session)
-                reconstruction = next(iter(list_reconstructions(transaction, session)), None)
+                reconstruction = next(iter(list_reconstructions(transaction, 1, session=session)), None)
                 return Stored(tracker, reconstruction, newest_readings(transaction, session))
 
         await self._flush()  # what was accepted before somebody watched is told to nobody: it must be in the database

@@ -1,25 +1,20 @@
 """Sessions as files: everything of one in one archive."""
 
 import tempfile
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
-from typing import IO
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
 from tracemesh.api.services import Services, UseServices
-from tracemesh.api.upload import file_body, parse_upload, store_upload
-from tracemesh.errors import InputError
+from tracemesh.api.upload import SPOOLED, chunks, file_body, parse_upload, spool_body, store_upload
 from tracemesh.storage.archive import Manifest, read_archive, restore, write_archive
 from tracemesh.storage.sessions import create_session, get_session
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.resources import Session, SessionCreate
 
-CHUNK = 2**16
-SPOOLED = 2**24
-"""Bytes of an archive that stay in memory; larger ones go to a temporary file."""
 router = APIRouter(prefix="/sessions", tags=["sessions"])
 
 
@@ -31,19 +26,14 @@ def export(session: Identifier, services: UseServices) -> StreamingResponse:
         write_archive(transaction, services.artifacts, session, file)
         stack.pop_all()  # closed when it was sent
     headers = {"Content-Disposition": f'attachment; filename="{session}.tracemesh.zip"'}
-    return StreamingResponse(_chunks(file), headers=headers, media_type="application/zip")
+    return StreamingResponse(chunks(file), headers=headers, media_type="application/zip")
 
 
 @router.post("/archive", status_code=201, openapi_extra=file_body("application/zip"))
 async def restore_session(request: Request, services: UseServices, response: Response) -> Session:
     """A new session from an archive: whole, or not at all."""
     with tempfile.SpooledTemporaryFile(SPOOLED) as file:
-        size = 0
-        async for chunk in request.stream():
-            size += len(chunk)
-            if size > services.settings.max_upload_bytes:
-                raise InputError(f"wanted an archive of at most {services.settings.max_upload_bytes} bytes")
-            file.write(chunk)
+        await spool_body(request, services.settings.max_upload_bytes, file)
         manifest, contents = await run_in_threadpool(read_archive, file, services.settings.max_session_bytes)
     async with _new_session(services, manifest.name) as session:
         for name, content in contents.items():
@@ -80,10 +70,3 @@ def _restore(services: Services, session: str, manifest: Manifest, contents: dic
 def _get(services: Services, session: str) -> Session:
     with services.database.read() as transaction:
         return get_session(transaction, session)
-
-
-def _chunks(file: IO[bytes]) -> Iterator[bytes]:
-    with file:
-        file.seek(0)
-        while chunk := file.read(CHUNK):
-            yield chunk

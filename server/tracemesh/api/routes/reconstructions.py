@@ -6,15 +6,15 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
+from tracemesh.api.paging import UsePage
 from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
-from tracemesh.api.upload import file_body, read_body, utf8
-from tracemesh.formats.networks import read_network
+from tracemesh.api.upload import file_body, read_body, store_network
 from tracemesh.storage import reconstructions
 from tracemesh.storage.artifacts import MEDIA_TYPES, artifact_row
 from tracemesh.storage.models import derived_id
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.live import Preview
-from tracemesh.wire.resources import PreviewWish, Reconstruction, ReconstructionParameters
+from tracemesh.wire.resources import JobState, PreviewWish, Reconstruction, ReconstructionParameters
 
 router = APIRouter(tags=["reconstructions"])
 
@@ -39,18 +39,8 @@ def create(
 async def span(session: Identifier, request: Request, services: UseServices, response: Response) -> Reconstruction:
     """Take in a curve network that is known already (network JSON) and queue the surface that spans it."""
     content = await read_body(request, services.settings.max_upload_bytes)
-    made = await run_in_threadpool(_store_network, services, session, content)
+    made = await run_in_threadpool(store_network, services, session, content)
     return _queued(services, response, made)
-
-
-def _store_network(services: Services, session: str, content: bytes) -> Reconstruction:
-    text = utf8(content)
-    read_network(text)
-    stored = text.encode()
-    digest = services.artifacts.put(stored)
-    with services.database.write() as transaction:
-        made = reconstructions.create_reconstruction(transaction, session, ReconstructionParameters())
-        return reconstructions.give_artifact(transaction, made.id, "network.json", digest, len(stored))
 
 
 def _queued(services: Services, response: Response, made: Reconstruction) -> Reconstruction:
@@ -72,9 +62,12 @@ async def preview(
 
 
 @router.get("/sessions/{session}/reconstructions")
-def list_all(session: Identifier, transaction: Reading) -> list[Reconstruction]:
-    """Newest first."""
-    return reconstructions.list_reconstructions(transaction, session)
+def list_all(
+    session: Identifier, transaction: Reading, page: UsePage, state: JobState | None = None
+) -> list[Reconstruction]:
+    """Newest first, all or those in one state; the `Link` header names the next page, when there is one."""
+    found = reconstructions.list_reconstructions(transaction, page.limit, page.after, session=session, state=state)
+    return page.of(found, lambda job: job.id)
 
 
 @router.get("/reconstructions/{reconstruction}")

@@ -6,10 +6,11 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 
 from tracemesh.api.outline import outline
+from tracemesh.api.paging import UsePage
 from tracemesh.api.services import IdempotencyKey, Reading, UseServices, Writing
 from tracemesh.storage import sessions
 from tracemesh.storage.models import derived_id
-from tracemesh.wire.base import Identifier
+from tracemesh.wire.base import Identifier, Name
 from tracemesh.wire.resources import Outline, Session, SessionCreate, SessionUpdate
 
 router = APIRouter(prefix="/sessions", tags=["sessions"])
@@ -28,16 +29,11 @@ def create(
 @router.get("")
 def list_all(
     transaction: Reading,
-    response: Response,
-    limit: Annotated[int, Query(ge=1, le=500)] = 100,
-    after: Annotated[Identifier | None, Query(description="last session of the page before")] = None,
+    page: UsePage,
+    name: Annotated[Name, Query(description="only those whose name contains it")] = "",
 ) -> list[Session]:
     """Newest first; the `Link` header names the next page, when there is one."""
-    found = sessions.list_sessions(transaction, limit + 1, after)
-    if len(found) > limit:
-        query = f"limit={limit}&after={found[limit - 1].id}"
-        response.headers["Link"] = f'</api/v1/sessions?{query}>; rel="next"'
-    return found[:limit]
+    return page.of(sessions.list_sessions(transaction, page.limit, page.after, name), lambda session: session.id)
 
 
 @router.get("/{session}")

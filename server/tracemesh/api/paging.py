@@ -1,0 +1,45 @@
+"""How long lists are answered: a page, and in the `Link` header the address of the next one."""
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, TypeVar
+from urllib.parse import urlencode
+
+from fastapi import Depends, Query, Request, Response
+
+from tracemesh.wire.base import Identifier
+
+T = TypeVar("T")
+MOST = 500
+"""Things on one page."""
+
+
+class Page:
+    """What of a list is wanted."""
+
+    def __init__(
+        self,
+        request: Request,
+        response: Response,
+        limit: Annotated[int, Query(ge=1, le=MOST, description="most things on the page")] = 100,
+        after: Annotated[Identifier | None, Query(description="last thing of the page before")] = None,
+    ) -> None:
+        """As asked for in the address."""
+        self._request = request
+        self._response = response
+        self._limit = limit
+        self.after = after
+
+    @property
+    def limit(self) -> int:
+        """How many to look for: one more than wanted tells whether there is a next page."""
+        return self._limit + 1
+
+    def of(self, found: Sequence[T], name: Callable[[T], object]) -> list[T]:
+        """The page, of what was found; `name` is what a thing is called in `after`."""
+        if len(found) > self._limit:
+            query = {**self._request.query_params, "limit": self._limit, "after": name(found[self._limit - 1])}
+            self._response.headers["Link"] = f'<{self._request.url.path}?{urlencode(query)}>; rel="next"'
+        return list(found[: self._limit])
+
+
+UsePage = Annotated[Page, Depends()]
