@@ -9,6 +9,7 @@ from time import perf_counter
 from benchmarks import (
     accuracy,
     arrays,
+    browsing,
     growth,
     ingest,
     lengths,
@@ -41,6 +42,7 @@ TABLES: dict[str, Callable[[Data], Table]] = {
     "arrays": arrays.arrays,
     "growth": growth.growth,
     "ingest": ingest.ingest,
+    "browsing": browsing.browsing,
     "requests": service.requests,
     "jobs": service.jobs,
     "costs": service.costs,
