@@ -40,6 +40,7 @@ def run(source: Source, procedure: Procedure, console: Console) -> Calibration:
     finally:
         stop.set()
         reader.join()
+        console.status(str)  # nothing any more
     return procedure.result()
 
 

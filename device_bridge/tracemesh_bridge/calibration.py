@@ -95,7 +95,7 @@ class Procedure:
         """One line that tells how far the step is."""
         if self._step == 0:
             return f"{len(self._acceleration)} readings | " + " | ".join(
-                f"{name} {seen.fraction:.0%}" + (f", missing {seen.in_words(4)}" if seen.missing else ", all")
+                f"{name} {seen.fraction:.0%}" + (f", missing {seen.in_words(3)}" if seen.missing else ", all")
                 for name, seen in self._seen().items()
             )
         if self._step == 1:

@@ -143,15 +143,21 @@ def _vectors(name: str, vectors: Sequence[Vector]) -> Iterator[Finding]:
 
 def _field(readings: Sequence[Reading], magnetic: Sequence[Vector]) -> Finding:
     lengths = [math.hypot(*m) for m in magnetic]
-    spread = statistics.pstdev(lengths) / statistics.fmean(lengths)
+    spread = _robust_deviation(lengths) / statistics.median(lengths)
     dips = [dip(r.acceleration, r.magnetic) for r in readings if r.acceleration and r.magnetic]
-    angle = statistics.pstdev(dips)
-    told = f"field |mag| {statistics.fmean(lengths):.3g} ± {100 * spread:.0f} %, "
-    told += f"dip {math.degrees(statistics.fmean(dips)):.0f} ± {math.degrees(angle):.1f}°"
+    angle = _robust_deviation(dips)
+    told = f"field |mag| {statistics.median(lengths):.3g} ± {100 * spread:.0f} %, "
+    told += f"dip {math.degrees(statistics.median(dips)):.0f} ± {math.degrees(angle):.1f}°"
     steady = spread <= STEADY_FIELD and angle <= STEADY_DIP
     return Finding(
         told, "" if steady else "there is iron or a magnet near, or the device was shaken: try another place"
     )
+
+
+def _robust_deviation(values: Sequence[float]) -> float:
+    """Standard deviation of values of which a few may be pure chance."""
+    middle = statistics.median(values)
+    return 1.4826 * statistics.median(abs(v - middle) for v in values)
 
 
 def _wheel(readings: Sequence[Reading]) -> Finding:

@@ -24,6 +24,13 @@ def test_a_healthy_device_needs_no_advice():
     assert advice(readings()) == []
 
 
+def test_a_few_readings_of_pure_chance_are_no_iron():
+    chance = [
+        Reading(received=1.0, ticks=(0, n), acceleration=(0.0, 0.5, 0.0), magnetic=(0.0, 0.5, 0.0)) for n in range(2)
+    ]
+    assert advice(readings(200) + chance, seconds=2.0) == []
+
+
 @pytest.mark.parametrize(
     ("sick", "faults", "seconds", "words"),
     [

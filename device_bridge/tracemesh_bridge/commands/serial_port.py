@@ -83,14 +83,15 @@ def _calibrate(args: argparse.Namespace) -> int:
     console = Console()
     host = Host(Link("device", console.say))
     found = run(Morphorider(settings, rider, host), Procedure(rider, args.length, args.place), console)
-    print(*describe(found), sep="\n")
+    for line in describe(found):
+        console.say(line)
     file = args.output or Path(f"{args.device}.calibration.json")
     save(found, file)
-    print(f"written to {file}")
+    console.say(f"written to {file}")
     if args.server:
         found = send(found, rider.kind, args.server)
         save(found, file)
-        print(f"{args.server} has it as {found.label}")
+        console.say(f"{args.server} has it as {found.label}")
     return 0
 
 

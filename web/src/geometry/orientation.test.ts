@@ -20,6 +20,21 @@ it("rolling to the right lowers the right side", () => {
   near(rotate(fromDeviceAngles(0, 0, 90), [1, 0, 0]), [0, 0, -1]);
 });
 
+it.each([
+  ["on its back", 0, 0, [0, 0, 1], [0, 1, 0]],
+  ["on its screen", 180, 0, [0, 0, -1], [0, -1, 0]],
+  ["standing", 90, 0, [0, 1, 0], [0, 0, -1]],
+  ["on its head", -90, 0, [0, -1, 0], [0, 0, 1]],
+  ["on its right side", 0, 90, [-1, 0, 0], [0, 1, 0]],
+  ["on its left side", 0, -90, [1, 0, 0], [0, 1, 0]],
+] as const)("a phone %s, facing each of four ways", (_name, beta, gamma, up, north) => {
+  for (const [alpha, to] of [[0, [0, 1, 0]], [90, [-1, 0, 0]], [180, [0, -1, 0]], [270, [1, 0, 0]]] as const) {
+    const q = fromDeviceAngles(alpha, beta, gamma);
+    near(rotate(q, up), [0, 0, 1]);
+    near(rotate(q, north), to);
+  }
+});
+
 it("products turn one after the other", () => {
   const [a, b] = [fromDeviceAngles(10, 20, 30), fromDeviceAngles(-40, 5, 70)];
   const v = [0.3, -0.2, 0.9] as const;
