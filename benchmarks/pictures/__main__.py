@@ -17,6 +17,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "fusion": devices.fusion,
     "magnetic_field": devices.magnetic_field,
     "calibration": devices.calibration,
+    "wheel_offset": devices.wheel_offset,
     "sketch": devices.sketch,
     "array_network": arrays.array_network,
     "cleaning": curves.cleaning,

@@ -19,10 +19,38 @@ from tracemesh.geometry.sensing.calibration import fit_calibration
 from tracemesh.geometry.sensing.fusion import frames_from_imu
 from tracemesh.geometry.sensing.magnetic_field import field_at
 from tracemesh.geometry.sensing.orientation import ReferenceField, angles_between, frames_from_vectors
+from tracemesh.geometry.sensing.wheel_offset import at_wheel
 from tracemesh.geometry.simulated.shapes import leaf
 from tracemesh.geometry.simulated.simulation import exact_scan
 
 FIELD = ReferenceField.from_inclination(np.radians(61.0))
+
+
+def wheel_offset() -> Figure:
+    """A wheel that runs above and beside a great circle of a sphere: the curve from its distances, and corrected."""
+    drawn, radius = figure(), 0.1
+    turn = np.linspace(0, 2 * np.pi, 400)
+    frames = Rotation.from_rotvec(np.outer(turn, [0, 0, 1])).as_matrix() @ np.array(
+        [[0.0, 1, 0], [1, 0, 0], [0, 0, -1]]
+    )
+    for k, height in enumerate((0.01, -0.01)):
+        title = (
+            f"sphere of {1e3 * radius:.0f} mm, wheel {1e3 * abs(height):.0f} mm {'above' if height > 0 else 'below'}"
+        )
+        axes, offset = plane(drawn, 121 + k, title, "mm", "mm"), np.array([0.0, height, 0.0])
+        axes.set_aspect("equal")
+        wheel = (radius + height) * turn
+        curves = (
+            ("the wheel's distances", wheel, ORANGE),
+            ("at the sensors", at_wheel(wheel, frames, offset).distance, BLUE),
+        )
+        axes.plot(*(1e3 * radius * np.array([np.cos(turn), np.sin(turn)])), color=GREY, lw=4, label="truth")
+        for label, distance, colour in curves:
+            steps = np.diff(distance)[:, None] * (frames[1:, :2, 0] + frames[:-1, :2, 0]) / 2
+            points = np.array([radius, 0]) + np.pad(np.cumsum(steps, axis=0), ((1, 0), (0, 0)))
+            axes.plot(*(1e3 * points.T), color=colour, lw=1, label=label)
+        axes.legend(fontsize=7, frameon=False)
+    return drawn
 
 
 def fusion() -> Figure:
