@@ -32,6 +32,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "node_inference": curves.node_inference,
     "cycles": surfaces.cycles,
     "patches": surfaces.patches,
+    "several_loops": surfaces.several_loops,
     "surface": surfaces.surface,
     "curvature": surfaces.curvature,
     "refinement": surfaces.refinement,

@@ -1,5 +1,6 @@
 """Pictures of the way from a curve network to a surface."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,10 @@ from benchmarks.pictures.canvas import (
 )
 from benchmarks.truths import MeshTruth
 from tracemesh.geometry.curves.spline_network import resample_network
-from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.network import CurveNetwork, Segment
+from tracemesh.geometry.surfaces.cell_complex import cell_complex
+from tracemesh.geometry.surfaces.curvature import normalised
+from tracemesh.geometry.surfaces.patches import outlines_of
 from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 
 STEP = 0.02
@@ -74,6 +78,43 @@ def patches() -> Figure:
     draw_mesh(right, mesh.vertices, mesh.faces, plain(mesh.faces), edges=True)
     draw_network(right, network)
     return drawn
+
+
+def several_loops() -> Figure:
+    """A face with four loops, cut open along slits, and a surface of six separate circles."""
+    drawn = figure()
+    plate = _circles([((0, 0, 0), 1.0), ((-0.4, -0.2, 0), 0.2), ((0.4, -0.2, 0), 0.2), ((0, 0.5, 0), 0.2)])
+    disk = span_surface(plate).mesh
+    axes = plane(drawn, 121, "a plate with three holes and its slits", "m", "m")
+    corners = list(disk.vertices[disk.faces, :2])
+    axes.add_collection(PolyCollection(corners, facecolors="#dce8f2", edgecolors=BLUE, linewidths=0.5))
+    walk = outlines_of(cell_complex(plate))[0].vertex
+    vertex, times = np.unique(walk, return_counts=True)
+    axes.scatter(*disk.vertices[vertex[times > 1], :2].T, s=12, color=ORANGE, zorder=3)
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    globe = _circles([(0.87 * axis, 0.5) for axis in (*np.eye(3), *-np.eye(3))])
+    mesh = span_surface(globe).mesh
+    right = space(drawn, mesh.vertices, 122, "a sphere of six openings")
+    draw_mesh(right, mesh.vertices, mesh.faces, plain(mesh.faces), edges=True)
+    draw_network(right, facing(right, globe))
+    return drawn
+
+
+def _circles(specs: Sequence[tuple[Sequence[float] | Floats, float]]) -> CurveNetwork:
+    """Open circles of (centre, radius): of a sphere around the origin, or of the plane if all centres lie in it."""
+    up, flat = np.array([0.0, 0.0, 1.0]), not any(centre[2] for centre, _ in specs)
+    points, normals, segments = np.empty((0, 3)), np.empty((0, 3)), []
+    for number, (centre, radius) in enumerate(specs):
+        along = up if flat else normalised(np.asarray(centre))
+        first = normalised(np.cross(along, np.eye(3)[np.argmin(abs(along))]))
+        count = round(50 * radius)
+        turn = 2 * np.pi * np.arange(count)[:, None] / count
+        circle = centre + radius * (np.cos(turn) * first + np.sin(turn) * np.cross(along, first))
+        segments.append(Segment(np.append(np.arange(count), 0) + len(points), True, number))
+        points = np.vstack([points, circle])
+        normals = np.vstack([normals, np.tile(up, (count, 1)) if flat else normalised(circle)])
+    return CurveNetwork(points, normals, np.empty(0, np.int64), tuple(segments))
 
 
 def surface() -> Figure:

@@ -114,11 +114,11 @@ def test_two_segments_that_share_a_point_inside_need_a_node() -> None:
 
 def test_rings_are_paired_across_the_band_between_them() -> None:
     band = cell_complex(rings([(1, 0, True), (1, 2, True)], sideways))
-    assert band.partners == {0: 1, 1: 0}
+    assert band.groups == ((0, 1),)
     assert len(band.openings) == 2
     globe = cell_complex(rings([(np.cos(0.5), np.sin(-0.5), False), (np.cos(0.5), np.sin(0.5), False)], radial))
     assert len(globe.faces) == 4
-    assert len(globe.partners) == 2
+    assert len(globe.groups) == 1
 
 
 def test_curves_that_nothing_connects_are_named() -> None:

@@ -1,14 +1,18 @@
-"""Faces with two boundary loops, cut open along a slit so that they can be meshed like the others.
+"""Faces with several boundary loops, cut open along slits so that they can be meshed like the others.
 
-Curves that no other curve connects bound faces like the band between two rings. Two loops bound the same face if most
-rays
-that leave either along its inward conormal meet the other one first, from the side it faces.
+Curves that no other curve connects bound faces like the band between two rings, or a plate around its holes. From every
+loop rays leave along its inward conormal and vote for the loop that they meet first, from the side that it faces. Two
+loops bound the same face if most rays of either meet the other one; or if one of them turns far less than a disk's
+boundary does, most of its rays meet other loops, and those that turn little themselves vote back.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from tracemesh.geometry.network import CurveNetwork, Floats, Ints
 from tracemesh.geometry.surfaces.curvature import normalised
@@ -16,6 +20,8 @@ from tracemesh.geometry.surfaces.cycles import Cycle
 
 CONE = 0.5  # cosine of the widest angle between a ray and the way to what it meets
 RAYS = 64
+SMALL_TURNING = 1.1 * np.pi  # rad, of a loop; that of a disk turns by 2 pi less its curvature
+LEAST_SHARE = 0.1  # of the rays of a loop that turns little, for a loop that they meet to count
 
 
 @dataclass(frozen=True)
@@ -31,12 +37,22 @@ class Outline:
     cycle: Cycle
 
 
-def partners(network: CurveNetwork, cycles: tuple[Cycle, ...]) -> dict[int, int]:
-    """Pairs of cycles, by index and in both directions, that bound the same face."""
-    points, _, inwards = (np.vstack(a) for a in zip(*(_sides(network, c) for c in cycles), strict=True))
-    loop = np.repeat(np.arange(len(cycles)), [len(c.points) for c in cycles])
-    first = [_most_met(points, inwards, loop, number) for number in range(len(cycles))]
-    return {a: b for a, b in enumerate(first) if b not in (None, a) and first[b] == a}
+def loops_of_faces(network: CurveNetwork, cycles: tuple[Cycle, ...], connected: bool) -> tuple[tuple[int, ...], ...]:
+    """Groups of two or more cycles, by index, that are the loops of one face.
+
+    connected: whether every curve is joined to all others; then only cycles that turn little are asked.
+    """
+    little = np.array([cycle.turning < SMALL_TURNING for cycle in cycles])
+    share = _votes(network, cycles, little if connected else np.ones(len(cycles), dtype=bool))
+    most = (share > 0.5) & (share.T > 0.5)
+    others = share * ~np.eye(len(cycles), dtype=bool)
+    meets = (others >= LEAST_SHARE) & (little & (others.sum(1) > 0.5))[:, None]
+    largest = np.where(little, 0, others).max(1, keepdims=True)  # of the loops that could bound a disk, one at most
+    meets &= np.where(little, meets.T, (others == largest) & (largest > 0))
+    linked = (most | meets) & ~np.eye(len(cycles), dtype=bool)
+    labels = csgraph.connected_components(sparse.csr_matrix(linked), directed=False)[1]
+    groups = (tuple(np.flatnonzero(labels == label).tolist()) for label in np.unique(labels))
+    return tuple(group for group in groups if len(group) > 1)
 
 
 def plain_outline(network: CurveNetwork, cycle: Cycle) -> Outline:
@@ -44,18 +60,53 @@ def plain_outline(network: CurveNetwork, cycle: Cycle) -> Outline:
     return Outline(network.points[cycle.points], network.normals[cycle.points], cycle.points, cycle)
 
 
-def joined_outline(network: CurveNetwork, one: Cycle, other: Cycle, next_vertex: int) -> Outline:
-    """Outline of a face with two loops; the slit's inner points are numbered from next_vertex on."""
-    a, b = _shortest_way(network, one, other)
-    there, back = np.roll(one.points, -a), np.roll(other.points, -b)
-    slit, facing = _slit(network, one, a, other, b)
-    number = next_vertex + np.arange(len(slit))
-    vertex = np.concatenate([there, there[:1], number, back, back[:1], number[::-1]])
-    points, normals = (
-        np.vstack([field[there], field[there[:1]], inner, field[back], field[back[:1]], inner[::-1]])
-        for field, inner in ((network.points, slit), (network.normals, facing))
-    )
-    return Outline(points, normals, vertex, one)
+def joined_outline(network: CurveNetwork, loops: Sequence[Cycle], next_vertex: int) -> Outline:
+    """Outline of a face with several loops; the slits' inner points are numbered from next_vertex on.
+
+    Loop after loop is joined to those before where the way across the face is shortest, never twice at one point.
+    """
+    walk = _Walk.along(network, loops[0])
+    left, used = list(loops[1:]), np.empty(0, np.int64)
+    while left:
+        others = [_Walk.along(network, cycle) for cycle in left]
+        ways = [_shortest_way(walk, other, used) for other in others]
+        nearest = int(np.argmin([length for _, _, length in ways]))
+        a, b, _ = ways[nearest]
+        used = np.append(used, [walk.vertex[a], others[nearest].vertex[b]])
+        walk = walk.joined(a, others[nearest], b, next_vertex)
+        next_vertex = max(next_vertex, int(walk.vertex.max()) + 1)
+        del left[nearest]
+    return Outline(walk.points, walk.normals, walk.vertex, loops[0])
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """A closed walk: points, normals, inward conormals (k, 3), numbers of the points (k,)."""
+
+    points: Floats
+    normals: Floats
+    inwards: Floats
+    vertex: Ints
+
+    @classmethod
+    def along(cls, network: CurveNetwork, cycle: Cycle) -> "_Walk":
+        return cls(*_sides(network, cycle), cycle.points)
+
+    def joined(self, a: int, other: "_Walk", b: int, next_vertex: int) -> "_Walk":
+        """The walk to position a, along a slit around another walk from b to b, and back to a and on."""
+        steps = float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).mean())
+        slit, facing = _slit(self, a, other, b, steps)
+        number = next_vertex + np.arange(len(slit))
+        there, back = np.arange(a, len(self.points) + a + 1), np.arange(b, len(other.points) + b + 1)
+        there, back = there % len(self.points), back % len(other.points)
+        parts = (
+            (self.points[there], slit, other.points[back], slit[::-1]),
+            (self.normals[there], facing, other.normals[back], facing[::-1]),
+            (self.inwards[there], 0 * slit, other.inwards[back], 0 * slit),
+        )
+        vertex = np.concatenate([self.vertex[there], number, other.vertex[back], number[::-1]])
+        points, normals, inwards = (np.vstack(part) for part in parts)
+        return _Walk(points, normals, inwards, vertex)
 
 
 def _sides(network: CurveNetwork, cycle: Cycle) -> tuple[Floats, Floats, Floats]:
@@ -74,32 +125,39 @@ def _meetings(points: Floats, inwards: Floats, start: Ints) -> NDArray[np.float6
     return np.where(leaves & enters & (distance > 0), distance, np.inf)
 
 
-def _most_met(points: Floats, inwards: Floats, loop: Ints, number: int) -> int | None:
-    """The loop that more than half of the rays from a loop meet first; None if there is none."""
-    start = np.flatnonzero(loop == number)
-    start = start[:: max(1, len(start) // RAYS)]
-    met = _meetings(points, inwards, start)
-    votes = np.bincount(loop[met.argmin(1)][np.isfinite(met.min(1))], minlength=int(loop.max()) + 1)
-    return int(votes.argmax()) if votes.max() > len(start) / 2 else None
+def _votes(network: CurveNetwork, cycles: tuple[Cycle, ...], asked: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(c, c) share of the rays from every cycle asked (c,) that meet every other one, or itself, first."""
+    points, _, inwards = (np.vstack(a) for a in zip(*(_sides(network, c) for c in cycles), strict=True))
+    loop = np.repeat(np.arange(len(cycles)), [len(c.points) for c in cycles])
+    share = np.zeros((len(cycles), len(cycles)))
+    for number in np.flatnonzero(asked):
+        start = np.flatnonzero(loop == number)
+        start = start[:: max(1, len(start) // RAYS)]
+        met = _meetings(points, inwards, start)
+        first = loop[met.argmin(1)][np.isfinite(met.min(1))]
+        share[number] = np.bincount(first, minlength=len(cycles)) / len(start)
+    return share
 
 
-def _shortest_way(network: CurveNetwork, one: Cycle, other: Cycle) -> tuple[int, int]:
-    """Positions in two cycles between which the way across the face is shortest."""
-    points, _, inwards = (np.vstack(pair) for pair in zip(_sides(network, one), _sides(network, other), strict=True))
+def _shortest_way(one: _Walk, other: _Walk, used: Ints) -> tuple[int, int, float]:
+    """Positions in two walks between which the way across the face is shortest, and its length; not at used points."""
+    points, inwards = np.vstack([one.points, other.points]), np.vstack([one.inwards, other.inwards])
     count = len(one.points)
     met = _meetings(points, inwards, np.arange(count))[:, count:]
+    if not np.isfinite(met).any():  # no two points face each other
+        met = np.linalg.norm(one.points[:, None] - other.points, axis=2)
+    met[np.isin(one.vertex, used) | ~one.inwards.any(1)] = np.inf
     a, b = np.unravel_index(int(met.argmin()), met.shape)
-    return int(a), int(b)
+    return int(a), int(b), float(met[a, b])
 
 
-def _slit(network: CurveNetwork, one: Cycle, a: int, other: Cycle, b: int) -> tuple[Floats, Floats]:
-    """Inner points and normals of a cubic from one loop to the other, leaving both along their conormals."""
-    (start, up, leave), (end, down, enter) = (
-        tuple(field[k] for field in _sides(network, cycle)) for cycle, k in ((one, a), (other, b))
-    )
+def _slit(one: _Walk, a: int, other: _Walk, b: int, steps: float) -> tuple[Floats, Floats]:
+    """Inner points and normals of a cubic from one walk to another, leaving both along their conormals; steps: m."""
+    start, up, leave = one.points[a], one.normals[a], one.inwards[a]
+    end, down, enter = other.points[b], other.normals[b], other.inwards[b]
     length = float(np.linalg.norm(end - start))
-    steps = np.linalg.norm(np.diff(network.points[one.points], axis=0), axis=1).mean()
-    t = (np.arange(1, max(1, round(length / steps))) / max(1, round(length / steps)))[:, None]
+    parts = max(1, round(length / steps))
+    t = (np.arange(1, parts) / parts)[:, None]
     path = (1 + 2 * t) * (1 - t) ** 2 * start + t**2 * (3 - 2 * t) * end
     path = path + length * (t * (1 - t) ** 2 * leave + t**2 * (1 - t) * enter)
     return path, normalised((1 - t) * up + t * down)

@@ -12,7 +12,7 @@ from scipy.sparse import csgraph
 from tracemesh.errors import NetworkError
 from tracemesh.geometry.network import CurveNetwork, Ints, Segment
 from tracemesh.geometry.scan import curve_name
-from tracemesh.geometry.surfaces.bridges import partners
+from tracemesh.geometry.surfaces.bridges import loops_of_faces
 from tracemesh.geometry.surfaces.cycles import Cycle, loop_points, trace_cycles
 
 # An opening seen from outside turns by -2 pi if the surface around it is flat, and by more the more it curves inwards.
@@ -26,14 +26,14 @@ UNIT_TOLERANCE = 1e-3
 class CellComplex:
     """A network whose every segment bounds one face (boundary) or two.
 
-    network: as given, with inferred boundary tags. faces: cycles to be spanned. partners: faces, by index, that are the
-    two loops of one face. openings: cycles that stay open.
+    network: as given, with inferred boundary tags. faces: cycles to be spanned. groups: of faces, by index, that are
+    the loops of one face, two or more. openings: cycles that stay open.
     inferred: whether the boundary was found instead of given.
     """
 
     network: CurveNetwork
     faces: tuple[Cycle, ...]
-    partners: dict[int, int]
+    groups: tuple[tuple[int, ...], ...]
     openings: tuple[Cycle, ...]
     inferred: bool
 
@@ -89,7 +89,8 @@ def _traced(network: CurveNetwork) -> tuple[CellComplex, Ints]:
     """Faces and openings as the network's tags have it, right or wrong; (segments,) the piece that each belongs to."""
     cycles = trace_cycles(network)
     pieces = _pieces(network)
-    paired = partners(network, cycles) if pieces.max() > 0 else {}
+    groups = loops_of_faces(network, cycles, connected=pieces.max() == 0)
+    paired = {number for group in groups for number in group}
     inferred = not any(segment.boundary for segment in network.segments)
     if inferred:
         network = _with_inferred_boundary(network, [c for k, c in enumerate(cycles) if k not in paired])
@@ -97,7 +98,8 @@ def _traced(network: CurveNetwork) -> tuple[CellComplex, Ints]:
     openings = _openings(network, cycles, paired)
     faces = [number for number in range(len(cycles)) if number not in openings]
     place = {number: k for k, number in enumerate(faces)}
-    loops = {place[a]: place[b] for a, b in paired.items() if a in place and b in place}
+    loops = tuple(tuple(place[number] for number in group if number in place) for group in groups)
+    loops = tuple(group for group in loops if len(group) > 1)
     complex_ = CellComplex(
         network, tuple(cycles[k] for k in faces), loops, tuple(cycles[k] for k in sorted(openings)), inferred
     )
@@ -198,7 +200,7 @@ def _pieces(network: CurveNetwork) -> Ints:
     return np.unique(labels, return_inverse=True)[1]
 
 
-def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...], paired: dict[int, int]) -> set[int]:
+def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...], paired: set[int]) -> set[int]:
     """Cycles along boundary segments only. Of the two sides of a lone closed boundary curve, the one that faces no
     other
     curve, or else the one that turns less.
@@ -217,8 +219,12 @@ def _openings(network: CurveNetwork, cycles: tuple[Cycle, ...], paired: dict[int
 
 
 def _apart(complex_: CellComplex, pieces: Ints) -> list[Fault]:
-    """Pieces of the network that no face with two loops joins to the first one."""
-    pairs = [[pieces[complex_.faces[k].sides[0].segment] for k in pair] for pair in complex_.partners.items()]
+    """Pieces of the network that no face with several loops joins to the first one."""
+    pairs = [
+        [pieces[complex_.faces[k].sides[0].segment] for k in (group[0], other)]
+        for group in complex_.groups
+        for other in group[1:]
+    ]
     first, second = np.array(pairs, np.int64).reshape(-1, 2).T
     size = int(pieces.max()) + 1
     graph = sparse.coo_matrix((np.ones(len(first)), (first, second)), (size, size))

@@ -16,6 +16,7 @@ from tracemesh.geometry.surfaces.planar_maps import (
     SMALLEST_AVERAGE,
     develop,
     map_to_circle,
+    parted,
     project_to_plane,
     signed_area,
 )
@@ -103,6 +104,16 @@ def _check_manifold(faces: Ints) -> None:
         )
 
 
+def _check_slits(outline: Outline, inside: int, faces: Ints) -> None:
+    """Raise SurfaceError where triangles on both sides of a slit, whose points are the same, share more than its edges.
+
+    inside: number of interior points. faces: (f, 3) into the outline's points, then those.
+    """
+    vertex = np.append(outline.vertex, int(outline.vertex.max()) + 1 + np.arange(inside))
+    if unique_edges(vertex[faces])[1].max() > 2:
+        raise SurfaceError("a slit between its loops is crossed")
+
+
 def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool:
     """Whether triangles in space are nearly as well shaped as in the plane, and none is turned over. vertices:
     (n, 3).
@@ -115,15 +126,16 @@ def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool
 
 
 def outlines_of(complex_: CellComplex) -> list[Outline]:
-    """Outline of every face; a face with two loops counts as the first of them."""
+    """Outline of every face; a face with several loops counts as the first of them."""
     network, outlines = complex_.network, []
     next_vertex = len(network.points)
+    group_of = {number: group for group in complex_.groups for number in group}
     for number, cycle in enumerate(complex_.faces):
-        other = complex_.partners.get(number)
-        if other is None:
+        group = group_of.get(number, (number,))
+        if len(group) == 1:
             outlines.append(plain_outline(network, cycle))
-        elif number < other:
-            outlines.append(joined_outline(network, cycle, complex_.faces[other], next_vertex))
+        elif number == group[0]:
+            outlines.append(joined_outline(network, [complex_.faces[k] for k in group], next_vertex))
             next_vertex = max(next_vertex, int(outlines[-1].vertex.max()) + 1)
     return outlines
 
@@ -161,9 +173,12 @@ def _triangulate(
     )
     for plane_map in maps:
         loop = plane_map()
+        loop = None if loop is None else parted(loop, outline.vertex)
         try:
             if loop is not None and signed_area(loop) > 0 and _perimeter(loop) < LARGEST_STRETCH * _perimeter(points):
-                return loop, *triangulate_polygon(loop, size * coarsening)
+                inside, faces = triangulate_polygon(loop, size * coarsening)
+                _check_slits(outline, len(inside), faces)
+                return loop, inside, faces
         except SurfaceError as error:
             reason = str(error)
     name = segment_name(network, outline.cycle.sides[0].segment)

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from tracemesh.geometry.network import Floats
+from tracemesh.geometry.network import Floats, Ints
 from tracemesh.geometry.surfaces.curvature import normalised
 from tracemesh.geometry.surfaces.cycles import turning_angles
 
+SLIT_WIDTH = 1e-3  # by which the sides of a slit are drawn apart, in mean edges
 SMALLEST_AVERAGE = 0.1  # length of the mean of unit normals below which its direction says nothing
 
 
@@ -43,6 +44,20 @@ def map_to_circle(points: Floats) -> Floats:
     steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     angle = 2 * np.pi * np.concatenate([[0.0], np.cumsum(steps)[:-1]]) / steps.sum()
     return np.asarray(np.column_stack([np.cos(angle), np.sin(angle)]) * steps.sum() / (2 * np.pi))
+
+
+def parted(loop: Floats, vertex: Ints) -> Floats:
+    """(k, 2) m, the loop with the two sides of every slit drawn apart, so that it does not touch itself.
+
+    vertex: (k,) numbers of the corners; those that occur more than once lie on slits and move to their own side, left
+    of the walk.
+    """
+    _, place, count = np.unique(vertex, return_inverse=True, return_counts=True)
+    ahead, behind = np.roll(loop, -1, axis=0) - loop, loop - np.roll(loop, 1, axis=0)
+    ahead, behind = (e / np.maximum(np.linalg.norm(e, axis=1, keepdims=True), 1e-300) for e in (ahead, behind))
+    left = (ahead + behind) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    step = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).mean()
+    return np.asarray(loop + SLIT_WIDTH * step * left * (count[place] > 1)[:, None])
 
 
 def signed_area(loop: Floats) -> float:

@@ -68,7 +68,7 @@ class SurfaceSolver:
         outlines = outlines_of(complex_)
         keys = [_key(outline) for outline in outlines]
         changed = np.array([key not in self._known for key in keys])
-        if changed.all() or self._whole or complex_.partners or self._parameters.soft is not None:
+        if changed.all() or self._whole or complex_.groups or self._parameters.soft is not None:
             changed[:] = True
             patches, flat = unrolled_patches(complex_, self._parameters, stages)
             vertices, normals, refinement = solved_surface(complex_, patches, flat, self._parameters, stages)
