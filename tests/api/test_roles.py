@@ -25,6 +25,8 @@ VIEWER = {
     ("GET", "/api/v1/sessions/{session}/outline"),
     ("GET", "/api/v1/sessions/{session}/problems"),
     ("GET", "/api/v1/sessions/{session}/scan.rawnet"),
+    ("GET", "/api/v1/sessions/{session}/nodes"),
+    ("GET", "/api/v1/sessions/{session}/segments"),
     ("GET", "/api/v1/sessions/{session}/curves"),
     ("GET", "/api/v1/sessions/{session}/curves/{index}"),
     ("GET", "/api/v1/sessions/{session}/recordings"),

@@ -671,6 +671,30 @@ export interface ReconstructionParameters {
   weights: "auto" | "thesis";
 }
 /**
+ * A node of the latest network of a session.
+ */
+export interface NetworkNode {
+  index: number;
+  /**
+   * unit, outward
+   *
+   * @minItems 3
+   * @maxItems 3
+   */
+  normal: [number, number, number];
+  /**
+   * m, world
+   *
+   * @minItems 3
+   * @maxItems 3
+   */
+  position: [number, number, number];
+  /**
+   * indices of those that begin or end here
+   */
+  segments: number[];
+}
+/**
  * What keeps a session's curves from being a network with a surface, or what a person should know of it.
  */
 export interface NetworkProblem {
@@ -691,6 +715,26 @@ export interface NetworkProblem {
  */
 export interface NetworkProblems {
   problems: NetworkProblem[];
+}
+/**
+ * A piece of a curve between two nodes of the latest network of a session.
+ */
+export interface NetworkSegment {
+  boundary: boolean;
+  /**
+   * number of its curve among those that were reconstructed
+   */
+  curve: number;
+  index: number;
+  /**
+   * m
+   */
+  length: number;
+  /**
+   * indices of the nodes at its ends; a closed curve that meets none has none
+   */
+  nodes: number[];
+  points: number;
 }
 /**
  * A token that was just made; nobody is told its secret again.

@@ -16,6 +16,7 @@ from tracemesh.api.access.gate import Gate
 from tracemesh.api.access.tokens import Tokens
 from tracemesh.api.comparing import Comparer
 from tracemesh.api.compression import WeakTags
+from tracemesh.api.described import DescribedApi
 from tracemesh.api.errors import install_handlers
 from tracemesh.api.limits import BodyLimits
 from tracemesh.api.live.hub import Hub
@@ -30,6 +31,7 @@ from tracemesh.api.routes import (
     devices,
     ingest,
     live,
+    networks,
     pages,
     proposals,
     readings,
@@ -63,7 +65,7 @@ def create_app(settings: Settings) -> FastAPI:
             app.state.services = services
             yield
 
-    app = FastAPI(
+    app = DescribedApi(
         title="tracemesh",
         version=version("tracemesh"),
         description="Curve networks and surfaces from orientations measured along curves.",
@@ -93,6 +95,7 @@ def create_app(settings: Settings) -> FastAPI:
         devices,
         ingest,
         live,
+        networks,
         tokens,
     )
     for module in routes:

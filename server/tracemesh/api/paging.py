@@ -6,6 +6,7 @@ from urllib.parse import urlencode
 
 from fastapi import Depends, Query, Request, Response
 
+from tracemesh.errors import InputError
 from tracemesh.wire.base import Identifier
 
 T = TypeVar("T")
@@ -28,6 +29,14 @@ class Page:
         self._response = response
         self._limit = limit
         self.after = after
+
+    @property
+    def window(self) -> slice:
+        """What to look for in a list whose things are called 0, 1, 2, ...; raises InputError."""
+        if self.after is not None and not self.after.isdecimal():
+            raise InputError(f"wanted after=NUMBER, got {self.after}")
+        first = 0 if self.after is None else int(self.after) + 1
+        return slice(first, first + self.limit)
 
     @property
     def limit(self) -> int:

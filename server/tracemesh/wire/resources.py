@@ -141,6 +141,26 @@ class Readings(Message):
     times: list[float] = Field(description="s, the device's own clock")
 
 
+class NetworkNode(Message):
+    """A node of the latest network of a session."""
+
+    index: Count
+    position: Vector = Field(description="m, world")
+    normal: Vector = Field(description="unit, outward")
+    segments: list[Count] = Field(description="indices of those that begin or end here")
+
+
+class NetworkSegment(Message):
+    """A piece of a curve between two nodes of the latest network of a session."""
+
+    index: Count
+    curve: Count = Field(description="number of its curve among those that were reconstructed")
+    boundary: bool
+    nodes: list[Count] = Field(description="indices of the nodes at its ends; a closed curve that meets none has none")
+    points: Count
+    length: float = Field(ge=0, description="m")
+
+
 class RecordingSummary(Message):
     """A recording of a session: what one device sent, or one uploaded file."""
 

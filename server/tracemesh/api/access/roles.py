@@ -57,6 +57,8 @@ TABLE: dict[tuple[str, str], Need | None] = {
     ("GET", SESSION + "/scan.rawnet"): LOOK,
     ("GET", SESSION + "/outline"): LOOK,
     ("POST", SESSION + "/networks"): EDIT,
+    ("GET", SESSION + "/nodes"): LOOK,
+    ("GET", SESSION + "/segments"): LOOK,
     ("GET", SESSION + "/curves"): LOOK,
     ("GET", SESSION + "/curves/{index}"): LOOK,
     ("PATCH", SESSION + "/curves/{index}"): EDIT,
