@@ -26,7 +26,7 @@ from tracemesh.geometry.curves.spline_network import resample_network
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.nodes.node_inference import InferredNodes, NodeProposal, infer_nodes, mark_nodes
-from tracemesh.geometry.scan import Floats, Scan, curve_name
+from tracemesh.geometry.scan import CurveScan, Floats, Scan, curve_name
 from tracemesh.geometry.sensing.odometry import NOMINAL_SPEED
 from tracemesh.geometry.sensor_array import SensorArray
 from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
@@ -241,7 +241,19 @@ def _lengths_report(scan: Scan) -> dict[str, object]:
     timed = [i for i, c in enumerate(scan.curves) if c.timed]
     arbitrary = len(timed) == len(scan.curves) and not given
     warning = f"no length was measured: the size is that of a hand that moves at {NOMINAL_SPEED:g} m/s"
-    return {"timed_curves": timed, "curves_with_given_lengths": given, "warnings": [warning] if arbitrary else []}
+    return {
+        "timed_curves": timed,
+        "pauses_s": [_paused(scan.curves[i]) for i in timed],
+        "curves_with_given_lengths": given,
+        "warnings": [warning] if arbitrary else [],
+    }
+
+
+def _paused(curve: CurveScan) -> float | None:
+    """s of a timed curve that count as no way."""
+    if curve.time is None:
+        return None
+    return max(0.0, float(np.ptp(curve.time) - np.ptp(curve.distance) / NOMINAL_SPEED))
 
 
 def _calibrations_report(scan: Scan) -> list[dict[str, object]]:

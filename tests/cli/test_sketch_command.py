@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def sketch(tmp_path: Path) -> Path:
     return path
 
 
-def reconstructed(folder: Path, scan: Path, *options: str) -> tuple[float, dict[str, list[object]]]:
+def reconstructed(folder: Path, scan: Path, *options: str) -> tuple[float, dict[str, list[Any]]]:
     """Diagonal of the network, m, and what the report says of lengths."""
     net, report = folder / "net.json", folder / "report.json"
     outputs = ("-o", folder / "m.obj", "--no-surface", "--network", net, "--report", report)
@@ -42,19 +43,20 @@ def test_without_any_length_it_warns_and_with_one_it_has_the_right_size(
     sketch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     true, said = reconstructed(tmp_path, tmp_path / "leaf.rawnet")
-    assert said == {"timed_curves": [], "curves_with_given_lengths": [], "warnings": []}
+    assert said == {"timed_curves": [], "pauses_s": [], "curves_with_given_lengths": [], "warnings": []}
     assert "warning" not in capsys.readouterr().err
 
     timed, said = reconstructed(tmp_path, sketch)
     everything = list(range(len(read_rawnet((tmp_path / "leaf.rawnet").read_text()).curves)))
     assert (said["timed_curves"], len(said["warnings"])) == (everything, 1)
+    assert all(3.0 < pause < 20.0 for pause in said["pauses_s"]), "a second at each node, before and after"
     assert "warning: no length was measured" in capsys.readouterr().err
     assert timed != pytest.approx(true, rel=0.03)
 
     curve = read_rawnet((tmp_path / "leaf.rawnet").read_text()).curves[1]
     length = float(np.diff(curve.distance[curve.node_samples])[0])
     measured, said = reconstructed(tmp_path, sketch, "--length", f"2:1={length}")
-    assert said == {"timed_curves": everything, "curves_with_given_lengths": [1], "warnings": []}
+    assert (said["timed_curves"], said["curves_with_given_lengths"], said["warnings"]) == (everything, [1], [])
     assert measured == pytest.approx(true, rel=0.03)
 
 

@@ -264,7 +264,7 @@ def with_marks(curve: CurveScan, marks: Sequence[tuple[int, int]]) -> CurveScan:
     distance = curve.distance
     if curve.timed and curve.time is not None:
         frames = np.stack([curve.tangent, curve.normal, np.cross(curve.tangent, curve.normal)], axis=2)
-        distance = distance_from_time(curve.time, frames, samples)
+        distance = distance_from_time(curve.time, frames, samples, curve.acceleration)
     return replace(curve, distance=distance, node_samples=samples, node_ids=ids)
 
 
@@ -317,7 +317,6 @@ def _distance(columns: dict[str, Floats], device: Device, tangent: Floats, norma
             columns["ticks"].astype(np.int64), device.wheel.circumference, device.wheel.ticks_per_turn
         )
     if "time" in columns:
-        return distance_from_time(
-            columns["time"], np.stack([tangent, normal, np.cross(tangent, normal)], axis=2), marks
-        )
+        frames = np.stack([tangent, normal, np.cross(tangent, normal)], axis=2)
+        return distance_from_time(columns["time"], frames, marks, columns.get("acceleration"))
     raise InputError("wanted ticks, distance or time in all its blocks, got none of them")
