@@ -15,10 +15,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tracemesh.formats.meshes import write_triangles
+from tracemesh.geometry.simulated.moving_arrays import NOISE, lattice
 from tracemesh.geometry.simulated.shapes import leaf
+from tracemesh.wire.device import Device, Hello
+from tracemesh_bridge.sources.virtual_array import declare, measure
 
 PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 FLAGS = [
@@ -39,6 +43,7 @@ def main(chosen: list[str]) -> None:
         watch(browser, address, keep="demo" in chosen or not chosen)
         if "page" in chosen or not chosen:
             show_page(browser, address)
+            show_array(browser, address)
             show_theme_and_phone(browser, address)
         browser.close()
 
@@ -96,6 +101,25 @@ def show_page(browser: Browser, address: str) -> None:
     page.get_by_role("button", name="New session").click()
     expect(page.get_by_text("Nothing scanned yet.")).to_be_visible()
     keep(page, "empty-session")
+    page.close()
+
+
+def show_array(browser: Browser, address: str) -> None:
+    """A reading of a waving lattice, and its surface."""
+    origin, generator, moving = address.split("/#/")[0], np.random.default_rng(0), lattice()
+    device = Device(id="lattice", kind="array", array=declare(moving))
+    readings = [measure(moving, n / 30, NOISE, generator).model_copy(update={"seq": n}) for n in range(60)]
+    lines = [m.model_dump_json(exclude_none=True) for m in (Hello(recording="lattice", device=device), *readings)]
+    headers = {"Content-Type": "application/json"}
+    for path, body in (("sessions", b'{"id": "lattice"}'), ("sessions/lattice/recordings", "\n".join(lines).encode())):
+        request = urllib.request.Request(f"{origin}/api/v1/{path}", body, headers)
+        urllib.request.urlopen(request, timeout=20).close()
+    page = browser.new_page(viewport=DESK, color_scheme="light", reduced_motion="reduce")
+    page.goto(f"{origin}/#/sessions/lattice")
+    expect(page.locator("canvas")).to_have_attribute("data-reading", "59")
+    page.get_by_role("button", name="Reconstruct").click()
+    expect(page.locator("canvas")).to_have_attribute("data-surface", "shown")
+    keep(page, "array")
     page.close()
 
 

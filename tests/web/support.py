@@ -53,6 +53,11 @@ class Server:
         with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
             return json.load(answer)
 
+    def upload(self, session: str, recording: str) -> None:
+        """Take in a recording as a file."""
+        address = f"http://{self.address}/api/v1/sessions/{session}/recordings"
+        urllib.request.urlopen(urllib.request.Request(address, recording.encode()), timeout=PATIENCE).close()
+
     def page(self, fragment: str = "") -> str:
         """Address of a page."""
         return f"http://{self.address}/{fragment}"

@@ -5,6 +5,7 @@ import type {
   ComparisonProgress,
   Curve,
   CurveUpdate,
+  LiveReading,
   NetworkProblems,
   NodeProposals,
   Outline,
@@ -108,6 +109,11 @@ export class Api {
   /** The network with these parameters and marks, at once; refused (409) when the same client asked again meanwhile. */
   preview(session: string, client: string, wish: Partial<PreviewWish>): Promise<Preview> {
     return this.#json<Preview>("POST", `/sessions/${session}/preview?client=${client}`, JSON.stringify(wish));
+  }
+
+  /** The network of one reading of a fixed array. */
+  reading(session: string, number: number): Promise<LiveReading> {
+    return this.#json<LiveReading>("GET", `/sessions/${session}/readings/${number}`);
   }
 
   proposals(session: string): Promise<NodeProposals> {

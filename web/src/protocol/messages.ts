@@ -5,6 +5,7 @@ import type {
   LiveNetwork,
   LiveNode,
   LivePoints,
+  LiveReading,
   LiveReconstruction,
   Snapshot,
 } from "../wire.gen";
@@ -17,6 +18,7 @@ export type ToBrowser =
   | LiveNode
   | LiveCurveEnd
   | LiveNetwork
+  | LiveReading
   | LiveDevice
   | LiveReconstruction;
 
@@ -27,6 +29,7 @@ const known: ReadonlySet<string> = new Set<ToBrowser["type"]>([
   "live.node",
   "live.curve.end",
   "live.network",
+  "live.reading",
   "live.device",
   "live.reconstruction",
 ]);

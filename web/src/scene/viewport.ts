@@ -35,6 +35,8 @@ export class Viewport {
   readonly #resizer: ResizeObserver;
   #surface: SurfaceLayer | undefined;
   #box: Box | undefined;
+  /** What a moving network was in so far. */
+  #swept: Box | undefined;
   #frame = 0;
   #last = 0;
   #fade = 1;
@@ -58,11 +60,13 @@ export class Viewport {
     this.#resize();
   }
 
-  /** Take over what the network shows now; `replaced`: its points may lie elsewhere than before. */
-  showNetwork(network: Network, replaced: boolean, follow: boolean): void {
-    if (replaced) this.#curves.replace(network, !this.still);
+  /** Take over what the network shows now; `replaced`: its points may lie elsewhere than before; `moving`: and will do so
+   * again at once, so that the view stays where it is as long as everything fits in. */
+  showNetwork(network: Network, replaced: boolean, follow: boolean, moving: boolean): void {
+    if (replaced) this.#curves.replace(network, !this.still && !moving);
     else this.#curves.grow(network);
-    this.#measure(network);
+    this.#measure(network, moving ? this.#swept : undefined);
+    this.#swept = moving ? this.#box : undefined;
     if (follow) this.fit();
     this.invalidate();
   }
@@ -209,8 +213,9 @@ export class Viewport {
     return morphing || travelling || fading;
   }
 
-  #measure(network: Network): void {
-    this.#box = boundingBox([...network.curves.values()].map((curve) => curve.points.coordinates));
+  #measure(network: Network, swept: Box | undefined): void {
+    const before = swept ? [swept.min, swept.max] : [];
+    this.#box = boundingBox([...[...network.curves.values()].map((curve) => curve.points.coordinates), ...before]);
     if (!this.#box) return;
     const { min, max } = this.#box;
     const size = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]);

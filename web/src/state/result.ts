@@ -38,15 +38,15 @@ export interface NetworkFile {
   readonly segments: readonly { readonly points: readonly number[]; readonly boundary: boolean; readonly curve: number }[];
 }
 
-/** Fetch the artifacts of a finished reconstruction. */
-export async function loadResult(api: Api, reconstruction: Reconstruction): Promise<Result> {
+/** Fetch the artifacts of a finished reconstruction. `named`: the numbers of its nodes, where they are not marks. */
+export async function loadResult(api: Api, reconstruction: Reconstruction, named?: readonly number[]): Promise<Result> {
   const { artifacts } = reconstruction;
   const [file, report, curves] = await Promise.all([
     api.artifact<NetworkFile>(artifacts["network.json"] ?? ""),
     api.artifact<Report>(artifacts["report.json"] ?? ""),
     api.curves(reconstruction.session),
   ]);
-  const marked = mergedNumbers(...curves.map((curve) => curve.marks.map((mark) => mark.node)));
+  const marked = named ?? mergedNumbers(...curves.map((curve) => curve.marks.map((mark) => mark.node)));
   return {
     reconstruction,
     report,

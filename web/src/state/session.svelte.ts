@@ -7,11 +7,14 @@ import type {
   CurveMarks,
   CurveUpdate,
   LiveDevice,
+  LiveReading,
   NetworkProblem,
   Reconstruction,
+  ReconstructionParameters,
   RecordingSummary,
   Session,
 } from "../wire.gen";
+import { ArrayStore } from "./array.svelte";
 import { putIn } from "./files";
 import { History } from "./history.svelte";
 import { Network } from "./network";
@@ -51,6 +54,15 @@ export class SessionStore {
   readonly live = new Network();
   readonly history = new History();
   readonly parameters = new ParametersStore();
+  readonly array = new ArrayStore({
+    fetch: (number) => this.api.reading(this.id, number),
+    isLive: (recording) => this.devices.some((device) => device.recording === recording && device.state === "live"),
+    changed: (outdates) => {
+      if (outdates) this.#outdate();
+      this.#redraw();
+    },
+    failed: (error) => (this.problem = inWords(error)),
+  });
   session = $state<Session>();
   connection = $state<Connection>("connecting");
   devices = $state.raw<readonly LiveDevice[]>([]);
@@ -103,7 +115,12 @@ export class SessionStore {
   /** What is drawn: the preview while parameters are moved, else the reconstructed network once there is one and
    * nothing was scanned since, else the live one. */
   get network(): Network {
-    return this.preview?.network ?? this.result?.network ?? this.live;
+    return this.preview?.network ?? this.result?.network ?? (this.ofArray ? this.array.network : this.live);
+  }
+
+  /** Whether a fixed array is what measures here, and nothing was scanned. */
+  get ofArray(): boolean {
+    return this.array.shown !== undefined && this.live.curves.size === 0;
   }
 
   async open(): Promise<void> {
@@ -131,6 +148,9 @@ export class SessionStore {
       case "live.reconstruction":
         this.#progressed(message.reconstruction);
         break;
+      case "live.reading":
+        this.array.hear(message);
+        break;
       default:
         this.#fold(message);
     }
@@ -151,7 +171,8 @@ export class SessionStore {
   /** Begin a reconstruction with the parameters as they are; one that is under way is not wanted any more. */
   async reconstruct(): Promise<void> {
     const before = this.reconstruction;
-    const { request } = this.parameters;
+    this.array.hold();
+    const request = this.#wish();
     await this.command(async () => this.#progressed(await this.api.reconstruct(this.id, request)));
     if (before && isBusy(before)) await this.api.cancel(before.id).catch(() => undefined);
   }
@@ -192,7 +213,14 @@ export class SessionStore {
     await this.command(() => this.history.redo());
   }
 
-  #fold(message: Exclude<ToBrowser, LiveDevice | { type: "live.reconstruction" }>): void {
+  /** The parameters as they are, and the reading that they are for. */
+  #wish(): Partial<ReconstructionParameters> {
+    const { request } = this.parameters;
+    const { shown } = this.array;
+    return this.ofArray && shown ? { ...request, reading: shown.number } : request;
+  }
+
+  #fold(message: Exclude<ToBrowser, LiveDevice | LiveReading | { type: "live.reconstruction" }>): void {
     const change = this.live.apply(message);
     if (change === "gap") return this.#socket?.restart();
     if (message.type === "live.snapshot" || message.type === "live.curve.start") void this.#listRecordings();
@@ -200,6 +228,7 @@ export class SessionStore {
     if (message.type === "live.snapshot") {
       this.known = true;
       this.#heard(message.devices);
+      for (const reading of message.readings) this.array.hear(reading);
       if (message.reconstruction) this.#progressed(message.reconstruction);
     }
     if (message.type === "live.curve.start" || message.type === "live.points") this.#outdate();
@@ -238,7 +267,8 @@ export class SessionStore {
     if (this.#loading === reconstruction.id) return;
     this.#loading = reconstruction.id;
     this.reconstruction ??= reconstruction;
-    const result = await loadResult(this.api, reconstruction);
+    const named = this.ofArray ? [...this.array.network.nodes.keys()] : undefined;
+    const result = await loadResult(this.api, reconstruction, named);
     if (this.#loading !== reconstruction.id) return;
     this.result = result;
     this.#stale = false;
@@ -249,7 +279,7 @@ export class SessionStore {
 
   async #try(marks: Trial): Promise<void> {
     try {
-      const wish = { ...this.parameters.request, marks: [...marks] };
+      const wish = { ...this.#wish(), marks: [...marks] };
       const { curves, nodes, report } = await this.api.preview(this.id, this.#client, wish);
       const network = new Network();
       network.apply({ type: "live.network", curves, nodes });
