@@ -47,7 +47,7 @@ class Assembler:
         self._time = SteadyTime(health)
         self._pose = PoseCheck(say)
         self._newest: dict[Sensor, Vector] = {}
-        self._last: tuple[float, Quaternion] | None = None
+        self._last: tuple[float, Quaternion | None] | None = None
 
     def sense(self, sensor: Sensor, vector: Vector) -> None:
         """Keep the newest value of a sensor. Acceleration in m/s^2, up at rest; rotation rate in rad/s."""
@@ -65,10 +65,25 @@ class Assembler:
         self._last = (time, quaternion)
         if "acceleration" in self._newest:
             self._pose.watch(rotation, self._newest["acceleration"])
-        steady = self._time.follow(time, received)
+        return self._reading(time, received, rotation)
+
+    def raw(self, time: float, received: float) -> Reading | None:
+        """The reading at a sample of the gyroscope, whose orientation is found later from all three sensors.
+
+        None until all have spoken, or if it is the same sample again.
+        """
+        if not {"acceleration", "magnetic", "rotation_rate"} <= self._newest.keys():
+            return None
+        if self._last == (time, None):
+            self._health.fault("repeated")
+            return None
+        self._last = (time, None)
+        return self._reading(time, received, None)
+
+    def _reading(self, time: float, received: float, rotation: Quaternion | None) -> Reading:
         reading = Reading(
             received=received,
-            time=steady,
+            time=self._time.follow(time, received),
             quaternion=rotation,
             acceleration=self._newest.get("acceleration"),
             magnetic=self._newest.get("magnetic"),

@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tracemesh.wire.device import Device
+from tracemesh.formats.recordings import Recording, scan_from_recordings
+from tracemesh.wire.device import CurveStart, Device, Hello, Samples
 from tracemesh_bridge.errors import BridgeError
 from tracemesh_bridge.health import Health, Host
 from tracemesh_bridge.phone import MOUNTING, Assembler, SteadyTime
@@ -92,6 +93,44 @@ def test_sensorserver_pose(pose, host):
     reading = source._take(event("rotation_vector", [*pose.as_quat().tolist(), 0.1]))
     is_pose(reading, pose)
     assert reading.time == 5.0
+
+
+def test_sensorserver_raw_streams_are_fused_into_the_pose(pose, host):
+    """Two seconds at rest, seen through the whole way from the app's events to the frames of the scan."""
+    source = SensorServer(
+        SensorServerSettings("h:8080", ("gyroscope", "accelerometer", "magnetic_field")), DEVICE, host
+    )
+    field = pose.inv().apply([0.0, 20.0, -40.0]).tolist()
+    readings = []
+    for n in range(200):
+        time = 5_000_000_000 + 10_000_000 * n
+        for sensor, values in (
+            ("accelerometer", gravity(pose)),
+            ("magnetic_field", field),
+            ("gyroscope", [0.0, 0.0, 0.0]),
+        ):
+            readings.append(source._take(event(sensor, values, time)))
+    kept = [r for r in readings if r is not None]
+    assert len(kept) == 200
+    assert all(r.quaternion is None for r in kept)
+    names = ("time", "acceleration", "magnetic", "rotation_rate")
+    block = Samples(seq=1, curve=0, first_sample=0, **{name: [getattr(r, name) for r in kept] for name in names})
+    hello = Hello(recording="r", device=DEVICE.model_copy(update={"mounting": MOUNTING}))
+    (curve,) = scan_from_recordings([Recording(hello, [CurveStart(seq=0, curve=0), block])]).curves
+    assert np.allclose(curve.tangent, pose.apply([0, 1, 0]), atol=0.01), "towards its top"
+    assert np.allclose(curve.normal, pose.apply([0, 0, 1]), atol=0.01), "out of its screen"
+
+
+def test_sensorserver_raw_streams_wait_for_all_three_and_take_none_twice(host):
+    source = SensorServer(
+        SensorServerSettings("h:8080", ("gyroscope", "accelerometer", "magnetic_field")), DEVICE, host
+    )
+    assert source._take(event("gyroscope", [0.0, 0.0, 0.1])) is None
+    assert source._take(event("accelerometer", [0.0, 0.0, 9.81])) is None
+    assert source._take(event("magnetic_field", [0.0, 20.0, -40.0])) is None
+    assert source._take(event("gyroscope", [0.0, 0.0, 0.1])).rotation_rate == (0.0, 0.0, 0.1)
+    assert source._take(event("gyroscope", [0.0, 0.0, 0.1])) is None
+    assert host.health.faults["repeated"] == 1
 
 
 def test_sensorserver_rotation_vector_of_three(host):

@@ -48,7 +48,7 @@ SLOW = 20.0
 
 @dataclass(frozen=True)
 class SensorServerSettings:
-    """address: host:port as the app shows it; sensors: their Android names without the prefix, one an orientation."""
+    """address: host:port as the app shows it; sensors: their Android names without the prefix."""
 
     address: str
     sensors: tuple[str, ...] = ("rotation_vector", "accelerometer", "magnetic_field", "gyroscope")
@@ -58,16 +58,20 @@ class SensorServer:
     """The app as a source of readings."""
 
     def __init__(self, settings: SensorServerSettings, device: Device, host: Host) -> None:
-        """Raises BridgeError if no sensor gives an orientation."""
+        """Raises BridgeError if the sensors tell no orientation."""
         self.device = device
         self._url = sensor_url(settings)
         self._only = PREFIX + settings.sensors[0]
+        self._raw = not _gives_orientation(settings)
         self._host = host
         self._link = host.link
         self._assembler = Assembler(host.health, host.link.note)
 
     def readings(self, stop: threading.Event) -> Iterator[Reading]:
-        """One reading for each rotation vector, until `stop` is set; connects again when the phone is lost."""
+        """One reading for each rotation vector, without any for each of the gyroscope's, until `stop` is set.
+
+        Connects again when the phone is lost.
+        """
         while not stop.is_set():
             self._link.to(LinkState.OPENING, self._url)
             try:
@@ -107,7 +111,7 @@ class SensorServer:
             self._assembler.sense(VECTORS[event.sensor], (event.values[0], event.values[1], event.values[2]))
         if event.sensor in ORIENTATIONS:
             return self._assembler.orient(event.time, rotation(event.values), received)
-        return None
+        return self._assembler.raw(event.time, received) if self._raw and event.sensor == "gyroscope" else None
 
     def _advise(self, now: float) -> None:
         if self._host.health.received == 50 and self._host.health.rate(now) < SLOW:
@@ -125,14 +129,18 @@ class Event:
 
 def sensor_url(settings: SensorServerSettings) -> str:
     """Where the app serves these sensors: its address for one differs from that for several. Raises BridgeError."""
-    if not any(s in ORIENTATIONS for s in settings.sensors):
-        wanted, got = (", ".join(names) for names in (ORIENTATIONS, settings.sensors))
-        raise BridgeError(f"wanted one of {wanted} among the sensors, got {got}")
+    if not _gives_orientation(settings) and not VECTORS.keys() <= set(settings.sensors):
+        wanted, raw, got = (", ".join(names) for names in (ORIENTATIONS, VECTORS, settings.sensors))
+        raise BridgeError(f"wanted one of {wanted} among the sensors, or all of {raw}, got {got}")
     names = [PREFIX + s for s in settings.sensors]
     base = f"ws://{settings.address.removeprefix('ws://').rstrip('/')}"
     if len(names) == 1:
         return f"{base}/sensor/connect?type={names[0]}"
     return f"{base}/sensors/connect?types={quote(json.dumps(names, separators=(',', ':')))}"
+
+
+def _gives_orientation(settings: SensorServerSettings) -> bool:
+    return any(s in ORIENTATIONS for s in settings.sensors)
 
 
 def parse_event(text: str | bytes, only: str) -> Event:
