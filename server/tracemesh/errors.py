@@ -10,6 +10,7 @@ TracemeshError
 └── ResourceError         what a request to the service names or asks for cannot be had
     ├── NotFound
     ├── Conflict
+    ├── Changed           it is not any more what the request says that it is
     ├── Unavailable       another service that is needed does not answer: asking again later may help
     │   └── ClusterAway   the scheduler of the cluster that runs jobs
     └── Refused           a device's message that is not taken: carries the code that the protocol has for it
@@ -59,6 +60,10 @@ class ResourceError(TracemeshError):
 
 class NotFound(ResourceError):  # noqa: N818 - HTTP's own words
     """Nothing has this name."""
+
+
+class Changed(ResourceError):  # noqa: N818 - no failure of the server
+    """It is not any more what the request says that it is."""
 
 
 class Conflict(ResourceError):  # noqa: N818 - HTTP's own words

@@ -34,7 +34,7 @@ def test_the_python_example_makes_a_mesh(base: str) -> None:
 
 
 def test_the_curl_example_queues_a_job(base: str, server: Any) -> None:
-    script = f"set -e\nserver={base}\n{examples('sh')[0]}"
+    script = f"set -e\nserver={base}\n{''.join(examples('sh'))}"
     subprocess.run(["sh", "-c", script], check=True, stdout=subprocess.DEVNULL)
     assert len(server.http.get("/sessions/lamp/reconstructions").json()) == 1
 

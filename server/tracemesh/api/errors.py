@@ -10,11 +10,11 @@ from pydantic import ValidationError
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
-from tracemesh.errors import Conflict, NotFound, TracemeshError, Unavailable
+from tracemesh.errors import Changed, Conflict, NotFound, TracemeshError, Unavailable
 from tracemesh.wire.resources import Problem
 
 log = logging.getLogger(__name__)
-STATUS = {NotFound: 404, Conflict: 409, Unavailable: 503}
+STATUS = {NotFound: 404, Conflict: 409, Changed: 412, Unavailable: 503}
 """Everything else that tracemesh raises on purpose says that the request's content cannot be used: 422."""
 
 
@@ -50,6 +50,8 @@ async def _on_own_error(request: Request, error: Exception) -> Response:
 
 async def _on_http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    if error.status_code == HTTPStatus.NOT_MODIFIED:
+        return Response(status_code=304, headers=error.headers)
     return problem(error.status_code, str(error.detail), request.url.path)
 
 

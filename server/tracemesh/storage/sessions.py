@@ -62,6 +62,13 @@ def reading_count(transaction: Transaction, identifier: str) -> int:
     return 0 if last is None else last + 1
 
 
+def lock_session(transaction: Transaction, identifier: str) -> None:
+    """Keep others from editing a session, or its curves, until the transaction ends; raises NotFound."""
+    query = select(SessionRow.id).where(SessionRow.id == identifier).with_for_update()
+    if transaction.scalar(query) is None:
+        raise NotFound(f"there is no session {identifier}")
+
+
 def session_row(transaction: Transaction, identifier: str) -> SessionRow:
     """Row of a session; raises NotFound."""
     row = transaction.get(SessionRow, identifier)

@@ -12,6 +12,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 
+from tracemesh.api.conditions import UseConditions
 from tracemesh.api.errors import validation_problems
 from tracemesh.api.paging import UsePage
 from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
@@ -64,9 +65,9 @@ def list_all(transaction: Reading, page: UsePage) -> list[Batch]:
 
 
 @router.get("/{batch}")
-def get(batch: Identifier, transaction: Reading) -> Batch:
+def get(batch: Identifier, transaction: Reading, conditions: UseConditions) -> Batch:
     """One batch, with how far it is."""
-    return batches.get_batch(transaction, batch)
+    return conditions.answer(batches.get_batch(transaction, batch))
 
 
 @router.get("/{batch}/reconstructions")

@@ -4,8 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path
 
+from tracemesh.api.conditions import UseConditions
 from tracemesh.api.services import Reading, UseServices
 from tracemesh.storage import curves
+from tracemesh.storage.sessions import lock_session
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.resources import Curve, CurveUpdate
 
@@ -20,15 +22,19 @@ def list_all(session: Identifier, transaction: Reading) -> list[Curve]:
 
 
 @router.get("/{index}")
-def get(session: Identifier, index: Index, transaction: Reading) -> Curve:
+def get(session: Identifier, index: Index, transaction: Reading, conditions: UseConditions) -> Curve:
     """One curve."""
-    return curves.get_curve(transaction, session, index)
+    return conditions.answer(curves.get_curve(transaction, session, index))
 
 
 @router.patch("/{index}")
-def update(session: Identifier, index: Index, change: CurveUpdate, services: UseServices) -> Curve:
-    """Change what the body names; the samples stay as they were sent."""
+def update(
+    session: Identifier, index: Index, change: CurveUpdate, services: UseServices, conditions: UseConditions
+) -> Curve:
+    """Change what the body names, with If-Match only what the sender has seen; samples stay as they were sent."""
     with services.database.write() as transaction:
+        lock_session(transaction, session)
+        conditions.demand(curves.get_curve(transaction, session, index))
         changed = curves.update_curve(transaction, session, index, change)
     services.edited(session)
-    return changed
+    return conditions.answer(changed)

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
+from tracemesh.api.conditions import UseConditions
 from tracemesh.api.paging import UsePage
 from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
 from tracemesh.api.upload import file_body, read_body, store_network
@@ -71,9 +72,9 @@ def list_all(
 
 
 @router.get("/reconstructions/{reconstruction}")
-def get(reconstruction: Identifier, transaction: Reading) -> Reconstruction:
+def get(reconstruction: Identifier, transaction: Reading, conditions: UseConditions) -> Reconstruction:
     """One reconstruction, with its progress."""
-    return reconstructions.get_reconstruction(transaction, reconstruction)
+    return conditions.answer(reconstructions.get_reconstruction(transaction, reconstruction))
 
 
 @router.post("/reconstructions/{reconstruction}/cancel", status_code=202)

@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 
+from tracemesh.api.conditions import UseConditions
 from tracemesh.api.outline import outline
 from tracemesh.api.paging import UsePage
 from tracemesh.api.services import IdempotencyKey, Reading, UseServices, Writing
@@ -37,9 +38,9 @@ def list_all(
 
 
 @router.get("/{session}")
-def get(session: Identifier, transaction: Reading) -> Session:
+def get(session: Identifier, transaction: Reading, conditions: UseConditions) -> Session:
     """One session."""
-    return sessions.get_session(transaction, session)
+    return conditions.answer(sessions.get_session(transaction, session))
 
 
 @router.get("/{session}/outline")
@@ -56,9 +57,11 @@ async def rawnet(session: Identifier, services: UseServices) -> PlainTextRespons
 
 
 @router.patch("/{session}")
-def update(session: Identifier, change: SessionUpdate, transaction: Writing) -> Session:
-    """Change what the body names."""
-    return sessions.update_session(transaction, session, change)
+def update(session: Identifier, change: SessionUpdate, transaction: Writing, conditions: UseConditions) -> Session:
+    """Change what the body names; with If-Match only what the sender has seen."""
+    sessions.lock_session(transaction, session)
+    conditions.demand(sessions.get_session(transaction, session))
+    return conditions.answer(sessions.update_session(transaction, session, change))
 
 
 @router.delete("/{session}", status_code=204)
