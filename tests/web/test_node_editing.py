@@ -124,6 +124,22 @@ def test_the_surface_follows_an_edit(server: Server, page: Page, session: str) -
     expect(view).to_have_attribute("data-surface", "shown")
 
 
+def test_a_measured_length_is_set_used_and_taken_back(server: Server, page: Page, session: str) -> None:
+    page.get_by_role("button", name="2 interior").click()
+    page.get_by_text("Measured lengths").click()
+    segments = page.get_by_role("list", name="Segments of curve 2").get_by_role("listitem")
+    expect(segments).to_have_count(2)
+    expect(segments.first).to_contain_text("cm")
+    segments.first.get_by_role("spinbutton").fill("120")
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("measured: 1.20 m")).to_be_visible()
+    expect(page.get_by_text("Measured lengths (1)")).to_be_visible()
+    assert server.call("GET", f"/sessions/{session}/curves")[1]["lengths"][0]["length"] == 1.2
+    page.get_by_role("button", name="Undo").click()
+    expect(page.get_by_text("Measured lengths (1)")).to_be_hidden()
+    assert server.call("GET", f"/sessions/{session}/curves")[1]["lengths"] == []
+
+
 def _nodes(page: Page) -> Locator:
     return page.get_by_role("list", name="Marked nodes").get_by_role("listitem")
 

@@ -261,9 +261,30 @@ export interface Curve {
    * m, as the odometer saw it
    */
   length: number;
+  /**
+   * of segments; used while both ends are marked
+   */
+  lengths: MeasuredLength[];
   marks: Mark[];
   recording: string;
   samples: number;
+}
+/**
+ * A length of a curve between two of its samples that somebody measured.
+ */
+export interface MeasuredLength {
+  /**
+   * sample that it is measured from
+   */
+  first: number;
+  /**
+   * sample that it is measured to; over the end of a closed curve where it is before
+   */
+  last: number;
+  /**
+   * m
+   */
+  length: number;
 }
 /**
  * A node marked on a curve.
@@ -288,6 +309,10 @@ export interface CurveEdit {
 export interface CurveUpdate {
   boundary: boolean | null;
   closed: boolean | null;
+  /**
+   * replace all measured lengths of the curve
+   */
+  lengths: MeasuredLength[] | null;
   /**
    * replace all marks of the curve
    */

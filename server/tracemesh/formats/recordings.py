@@ -265,7 +265,8 @@ def with_marks(curve: CurveScan, marks: Sequence[tuple[int, int]]) -> CurveScan:
     if curve.timed and curve.time is not None:
         frames = np.stack([curve.tangent, curve.normal, np.cross(curve.tangent, curve.normal)], axis=2)
         distance = distance_from_time(curve.time, frames, samples, curve.acceleration)
-    return replace(curve, distance=distance, node_samples=samples, node_ids=ids)
+    lengths = curve.lengths if len(samples) == len(curve.node_samples) else None
+    return replace(curve, distance=distance, node_samples=samples, node_ids=ids, lengths=lengths)
 
 
 def _joined(blocks: Sequence[Samples]) -> dict[str, Floats]:

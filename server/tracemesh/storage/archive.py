@@ -18,14 +18,14 @@ from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import InputError
 from tracemesh.storage.artifacts import ArtifactStore
-from tracemesh.storage.curves import marks_of, replace_marks
+from tracemesh.storage.curves import marks_of, replace_lengths, replace_marks
 from tracemesh.storage.devices import add_calibration, choose_calibration, corrected_hello
 from tracemesh.storage.models import ArtifactRow, CurveRow, ReconstructionRow, RecordingRow, new_id
 from tracemesh.storage.recordings import recording_messages
 from tracemesh.storage.sessions import session_row
 from tracemesh.wire.base import Count, Identifier, Message, Name
 from tracemesh.wire.calibration import Calibration
-from tracemesh.wire.resources import Mark, ReconstructionParameters
+from tracemesh.wire.resources import Mark, MeasuredLength, ReconstructionParameters
 
 MANIFEST = "session.json"
 DAMAGED = (
@@ -54,6 +54,7 @@ class ArchivedCurve(Message):
     closed: bool
     removed: bool
     marks: list[Mark]
+    lengths: list[MeasuredLength] = Field(default=[])
 
 
 class ArchivedReconstruction(Message):
@@ -128,6 +129,7 @@ def restore(
         row = rows[curve.recording, curve.number]
         row.boundary, row.closed, row.removed = curve.boundary, curve.closed, curve.removed
         replace_marks(transaction, row, curve.marks)
+        replace_lengths(row, curve.lengths)
     transaction.flush()
     _renumber(transaction, session, {rows[c.recording, c.number].index: c.index for c in manifest.curves})
     for reconstruction in manifest.reconstructions:
@@ -206,6 +208,7 @@ def _archived_curves(transaction: Transaction, session: str) -> list[ArchivedCur
             closed=row.closed,
             removed=row.removed,
             marks=marks_of(transaction, row),
+            lengths=[MeasuredLength.model_validate(entry) for entry in row.lengths],
         )
         for (recording, number), row in _rows_by_origin(transaction, session).items()
     ]

@@ -1,6 +1,7 @@
 """Curves and marks: derived from what was sent, editable."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from sqlalchemy import ColumnElement, delete, select
 from sqlalchemy.orm import Session as Transaction
@@ -8,7 +9,7 @@ from sqlalchemy.orm import Session as Transaction
 from tracemesh.errors import InputError, NotFound
 from tracemesh.storage.models import CurveRow, MarkRow, RecordingRow
 from tracemesh.storage.sessions import session_row
-from tracemesh.wire.resources import Curve, CurveUpdate, Mark
+from tracemesh.wire.resources import Curve, CurveUpdate, Mark, MeasuredLength
 
 
 def list_curves(transaction: Transaction, session: str) -> list[Curve]:
@@ -30,9 +31,30 @@ def update_curve(transaction: Transaction, session: str, index: int, change: Cur
         if value is not None:
             setattr(row, name, value)
     if change.marks is not None:
+        row.lengths = _carried(row.lengths, marks_of(transaction, row), change.marks)
         replace_marks(transaction, row, change.marks)
+    if change.lengths is not None:
+        replace_lengths(row, change.lengths)
     transaction.flush()
     return _curve(transaction, row)
+
+
+def replace_lengths(row: CurveRow, lengths: Iterable[MeasuredLength]) -> None:
+    """Give a curve these measured lengths instead of its own; raises InputError for one beyond its samples."""
+    known = [length.model_dump() for length in lengths]
+    for entry in known:
+        if (beyond := max(entry["first"], entry["last"])) >= row.samples:
+            raise InputError(f"curve {row.index} has {row.samples} samples, got a length at sample {beyond}")
+    row.lengths = known
+
+
+def _carried(lengths: list[dict[str, Any]], old: list[Mark], new: list[Mark]) -> list[dict[str, Any]]:
+    """Lengths between marks that were moved: what was measured is between the nodes, wherever they are marked."""
+    if len(old) != len(new):
+        return lengths
+    moved = dict(zip(sorted(m.sample for m in old), sorted(m.sample for m in new), strict=True))
+    ends = ("first", "last")
+    return [{**entry, **{end: moved.get(entry[end], entry[end]) for end in ends}} for entry in lengths]
 
 
 def replace_marks(transaction: Transaction, row: CurveRow, marks: Iterable[Mark]) -> None:
@@ -77,4 +99,5 @@ def _curve(transaction: Transaction, row: CurveRow) -> Curve:
         samples=row.samples,
         length=row.length,
         marks=marks_of(transaction, row),
+        lengths=[MeasuredLength.model_validate(entry) for entry in row.lengths],
     )

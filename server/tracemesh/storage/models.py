@@ -139,7 +139,9 @@ class MessageRow(Base):
 
 
 class CurveRow(Base):
-    """One curve of a session; `number` is its number within its recording, `odometer` (m) its last reading."""
+    """One curve of a session; `number` is its number within its recording, `odometer` (m) its last
+    reading, `lengths` what was measured between samples.
+    """
 
     __tablename__ = "curves"
     __table_args__ = (UniqueConstraint("recording_key", "number"),)
@@ -155,6 +157,7 @@ class CurveRow(Base):
     samples: Mapped[int] = mapped_column(Long, default=0)
     length: Mapped[float] = mapped_column(default=0.0)
     odometer: Mapped[float | None]
+    lengths: Mapped[list[dict[str, Any]]] = mapped_column(JSON, default=list)
 
 
 class MarkRow(Base):

@@ -1,13 +1,17 @@
 """The scan that a session amounts to: samples as sent, everything else as edited."""
 
 from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import ScanError
 from tracemesh.formats.recordings import Recording, scan_as_sent
 from tracemesh.geometry.curves.closed_curves import begun_at_nodes
-from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.scan import CurveScan, Scan
 from tracemesh.storage.curves import curve_rows, marks_of
 from tracemesh.storage.devices import corrected_hello
 from tracemesh.storage.models import CurveRow, RecordingRow
@@ -38,7 +42,22 @@ def load_sent(transaction: Transaction, session: str) -> tuple[Scan, list[int]]:
         raise ScanError(f"session {session} has no curve with samples")
     blocks = {key: sample_blocks(transaction, key) for key in {row.recording_key for row in rows}}
     recordings = [_edited(transaction, row, blocks[row.recording_key][row.number]) for row in rows]
-    return scan_as_sent(recordings), [row.index for row in rows]
+    scan = scan_as_sent(recordings)
+    curves = tuple(with_measured(c, _measured(row)) for c, row in zip(scan.curves, rows, strict=True))
+    return Scan(curves), [row.index for row in rows]
+
+
+def with_measured(curve: CurveScan, measured: Mapping[tuple[int, int], float]) -> CurveScan:
+    """A curve as sent with those lengths (m, by first and last sample) that are between two neighbouring marks."""
+    samples = curve.node_samples.tolist()
+    returns = len(samples) > 1 and curve.node_ids[0] == curve.node_ids[-1]
+    ends = samples + samples[:1] if curve.closed and not returns else samples
+    lengths = np.array([measured.get(pair, np.nan) for pair in pairwise(ends)])
+    return curve if np.isnan(lengths).all() else replace(curve, lengths=lengths)
+
+
+def _measured(row: CurveRow) -> dict[tuple[int, int], float]:
+    return {(entry["first"], entry["last"]): entry["length"] for entry in row.lengths}
 
 
 def sample_blocks(transaction: Transaction, key: int) -> Blocks:

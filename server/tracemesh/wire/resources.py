@@ -89,6 +89,14 @@ class Mark(Message):
     node: Count
 
 
+class MeasuredLength(Message):
+    """A length of a curve between two of its samples that somebody measured."""
+
+    first: Count = Field(description="sample that it is measured from")
+    last: Count = Field(description="sample that it is measured to; over the end of a closed curve where it is before")
+    length: float = Field(gt=0, description="m")
+
+
 class Curve(Message):
     """One scanned curve of a session."""
 
@@ -100,6 +108,7 @@ class Curve(Message):
     samples: Count
     length: float = Field(ge=0, description="m, as the odometer saw it")
     marks: list[Mark]
+    lengths: list[MeasuredLength] = Field(default=[], description="of segments; used while both ends are marked")
 
 
 class CurveUpdate(Message):
@@ -109,6 +118,9 @@ class CurveUpdate(Message):
     closed: bool | None = None
     removed: bool | None = Field(default=None, description="left out of everything; its samples stay stored")
     marks: list[Mark] | None = Field(default=None, max_length=10_000, description="replace all marks of the curve")
+    lengths: list[MeasuredLength] | None = Field(
+        default=None, max_length=10_000, description="replace all measured lengths of the curve"
+    )
 
 
 class NodePlace(Message):

@@ -1,7 +1,19 @@
+import { formatLength } from "../geometry/units";
 import { polylineLength, type Vector } from "../geometry/vectors";
-import type { Curve, CurveMarks, CurveUpdate, Mark, NetworkProblem, NodeProposal, NodeProposals } from "../wire.gen";
+import type { Curve, CurveMarks, CurveUpdate, Mark, MeasuredLength, NetworkProblem, NodeProposal, NodeProposals } from "../wire.gen";
 import type { Command } from "./history.svelte";
-import { type MarkPlace, marksChanged, marksWith, newNode, placesOf, roomFor, sameMarks, unmarked } from "./marks";
+import {
+  lengthsWith,
+  type MarkPlace,
+  marksChanged,
+  marksWith,
+  newNode,
+  placesOf,
+  roomFor,
+  sameMarks,
+  type SegmentEnds,
+  unmarked,
+} from "./marks";
 import type { Network } from "./network";
 import type { Place } from "./overlay";
 import type { CurveEntry, SessionStore } from "./session.svelte";
@@ -204,6 +216,16 @@ export class EditStore {
       () => `node ${node} deleted`,
       ({ marks }) => marks.filter((mark) => mark.node !== node),
     );
+  }
+
+  /** Say how long a segment is, m, as somebody measured it; undefined: nobody did. */
+  async measure(curve: number, segment: SegmentEnds, length: number | undefined): Promise<void> {
+    const old = this.store.detailsOf(curve)?.lengths ?? [];
+    const set = (lengths: MeasuredLength[]): Promise<void> => this.store.write([{ index: curve, change: { lengths } }]);
+    const name = `segment ${segment.first.node}–${segment.last.node}`;
+    const label = length === undefined ? `${name} not measured any more` : `${name} measured: ${formatLength(length)}`;
+    const fresh = lengthsWith(old, segment, length);
+    await this.store.command(() => this.store.history.do({ label, run: () => set(fresh), revert: () => set(old) }));
   }
 
   // Proposals -------------------------------------------------------------------------------------------------------

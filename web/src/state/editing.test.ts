@@ -116,7 +116,7 @@ it("does the same by key", async () => {
 
 it("does what mends a problem and takes it back", async () => {
   const { edit, marked, store } = setup();
-  const nothing = { boundary: null, closed: null, removed: null, marks: null };
+  const nothing = { boundary: null, closed: null, removed: null, marks: null, lengths: null };
   const marks = [{ sample: 7, node: 3 }];
   const changes = [
     { curve: 1, change: { ...nothing, marks } },

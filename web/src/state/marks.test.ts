@@ -1,6 +1,16 @@
 import { expect, it } from "vitest";
 import type { Curve } from "../wire.gen";
-import { marksChanged, marksWith, newNode, placesOf, roomFor, sameMarks, unmarked } from "./marks";
+import {
+  lengthsWith,
+  marksChanged,
+  marksWith,
+  newNode,
+  placesOf,
+  roomFor,
+  sameMarks,
+  segmentsOf,
+  unmarked,
+} from "./marks";
 
 const marks = [
   { sample: 0, node: 1 },
@@ -62,4 +72,25 @@ it("finds every mark of a node, also two on one curve", () => {
     { curve: 0, sample: 120 },
     { curve: 3, sample: 0 },
   ]);
+});
+
+it("cuts curves at their marks, closed ones all the way round, and knows what was measured", () => {
+  const three = [...marks, { sample: 120, node: 3 }];
+  const names = (curve: Parameters<typeof segmentsOf>[0]): string[] =>
+    segmentsOf(curve).map(({ first, last, measured }) => `${first.node}-${last.node} ${measured ?? ""}`.trim());
+  const lengths = [{ first: 120, last: 0, length: 0.4 }];
+  expect(names({ marks: three, closed: false, lengths })).toEqual(["1-2", "2-3"]);
+  expect(names({ marks: three, closed: true, lengths })).toEqual(["1-2", "2-3", "3-1 0.4"]);
+  expect(names({ marks: [...three, { sample: 150, node: 1 }], closed: true, lengths })).toEqual(["1-2", "2-3", "3-1"]);
+  expect(names({ marks: [], closed: true, lengths })).toEqual([]);
+});
+
+it("sets and takes away one measured length", () => {
+  const [segment] = segmentsOf({ marks, closed: false, lengths: [] });
+  if (!segment) throw new Error("there is a segment");
+  const other = { first: 5, last: 9, length: 1 };
+  const set = lengthsWith([other], segment, 0.3);
+  expect(set).toEqual([other, { first: 0, last: 90, length: 0.3 }]);
+  expect(lengthsWith(set, segment, 0.5)).toEqual([other, { first: 0, last: 90, length: 0.5 }]);
+  expect(lengthsWith(set, segment, undefined)).toEqual([other]);
 });

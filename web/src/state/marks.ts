@@ -1,4 +1,4 @@
-import type { Curve, Mark, NodePlace, NodeProposal } from "../wire.gen";
+import type { Curve, Mark, MeasuredLength, NodePlace, NodeProposal } from "../wire.gen";
 
 /** A curve's marks with a node marked at more places, in the order of the samples; nothing is marked twice. */
 export function marksWith(marks: readonly Mark[], places: readonly NodePlace[], node: number): Mark[] {
@@ -49,4 +49,34 @@ export function marksChanged(marks: readonly Mark[], { sample, node }: Mark, to:
   const isIt = (mark: Mark): boolean => mark.sample === sample && mark.node === node;
   const changed = marks.flatMap((mark) => (isIt(mark) ? (to ? [{ ...mark, ...to }] : []) : [mark]));
   return changed.sort((a, b) => a.sample - b.sample);
+}
+
+/** A stretch of a curve between two neighbouring marks. */
+export interface SegmentEnds {
+  readonly first: Mark;
+  readonly last: Mark;
+  /** m, if somebody measured it. */
+  readonly measured: number | undefined;
+}
+
+/** The segments of a curve in its order; a closed one returns to its first mark. */
+export function segmentsOf({ marks, closed, lengths }: Pick<Curve, "marks" | "closed" | "lengths">): SegmentEnds[] {
+  const [first, final] = [marks[0], marks.at(-1)];
+  const returns = marks.length > 1 && first?.node === final?.node;
+  const ends = closed && first && !returns ? [...marks, first] : marks;
+  return ends.slice(1).map((last, i) => {
+    const from = ends[i] as Mark;
+    const known = lengths.find((length) => length.first === from.sample && length.last === last.sample);
+    return { first: from, last, measured: known?.length };
+  });
+}
+
+/** Measured lengths with that of one segment set (m), or taken away. */
+export function lengthsWith(
+  lengths: readonly MeasuredLength[],
+  { first, last }: SegmentEnds,
+  length: number | undefined,
+): MeasuredLength[] {
+  const others = lengths.filter((known) => known.first !== first.sample || known.last !== last.sample);
+  return length === undefined ? others : [...others, { first: first.sample, last: last.sample, length }];
 }
