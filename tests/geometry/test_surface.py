@@ -118,6 +118,16 @@ def test_order_and_direction_of_curves_do_not_matter() -> None:
     assert cKDTree(one.vertices).query(other.vertices)[0].max() < 1e-9 * network.diagonal
 
 
+def test_nearly_flat_patches_are_meshed_at_once_and_others_unrolled_first() -> None:
+    def rounds(network: CurveNetwork) -> int:
+        told: list[str] = []
+        result = span_surface(network, FAST, progress=lambda stage, _: told.append(stage))
+        assert float(str(result.report["min_angle_deg"])) > 20
+        return told.count("patches")
+
+    assert (rounds(window(6, wave)), rounds(octants(0.2))) == (1, 2)
+
+
 def test_mesh_size_is_independent_of_the_network() -> None:
     network = window(8, wave)
     counts = {}

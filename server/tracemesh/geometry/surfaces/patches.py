@@ -23,6 +23,7 @@ from tracemesh.geometry.surfaces.planar_maps import (
 from tracemesh.geometry.surfaces.quality import inverted_faces, triangle_angles
 from tracemesh.geometry.surfaces.triangulation import triangulate_polygon
 
+FLAT = 0.9  # of an edge's length that its projection keeps, for a patch that need not be unrolled
 LARGEST_STRETCH = 2.0  # of a boundary in the plane; more says that the surface it was unrolled from went astray
 
 
@@ -114,6 +115,15 @@ def _check_slits(outline: Outline, inside: int, faces: Ints) -> None:
         raise SurfaceError("a slit between its loops is crossed")
 
 
+def nearly_flat(complex_: CellComplex) -> bool:
+    """Whether every patch keeps its shape when projected along its average normal, as far as its boundary tells."""
+    for outline in outlines_of(complex_):
+        loop = project_to_plane(outline.points, outline.normals)
+        if loop is None or (_edge_lengths(loop) < FLAT * _edge_lengths(outline.points)).any():
+            return False
+    return True
+
+
 def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool:
     """Whether triangles in space are nearly as well shaped as in the plane, and none is turned over. vertices:
     (n, 3).
@@ -142,7 +152,12 @@ def outlines_of(complex_: CellComplex) -> list[Outline]:
 
 def _perimeter(loop: Floats) -> float:
     """m, length of a closed polygon (k, 2 or 3)."""
-    return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
+    return float(_edge_lengths(loop).sum())
+
+
+def _edge_lengths(loop: Floats) -> Floats:
+    """(k,) m, of a closed polygon (k, 2 or 3)."""
+    return np.asarray(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1))
 
 
 def _lift(outline: Outline) -> Floats:

@@ -15,7 +15,7 @@ from tracemesh.geometry.surfaces.curvature import extended_to_boundary, gaussian
 from tracemesh.geometry.surfaces.edges import boundary_vertices
 from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian
 from tracemesh.geometry.surfaces.linear_surface import REBUILDS, linear_surface, rebuilt_surface, settled_surface
-from tracemesh.geometry.surfaces.patches import PatchMesh, triangulate_patches, unrolled_well
+from tracemesh.geometry.surfaces.patches import PatchMesh, nearly_flat, triangulate_patches, unrolled_well
 from tracemesh.geometry.surfaces.quality import inverted_faces, mesh_quality
 from tracemesh.geometry.surfaces.soft_constraints import softened_points
 from tracemesh.geometry.surfaces.subdivision import graded, subdivided
@@ -114,20 +114,20 @@ def linear_patches(
 
 
 def unrolled_patches(complex_: CellComplex, parameters: SurfaceParameters, stages: Stages) -> tuple[PatchMesh, Floats]:
-    """Patches and vertices: over projected patches, then over the same unrolled."""
+    """Patches and vertices: over projected patches, then, unless all are nearly flat, over the same unrolled."""
     points, normals = complex_.network.points, complex_.network.normals
-    last = None
+    last, trial = None, not nearly_flat(complex_)
     for attempt in range(LARGEST_UNROLLS + 1):
         stages.begin("patches", 0.1 + 0.05 * attempt)
-        patches = triangulate_patches(complex_, parameters.mesh_size, COARSE if last is None else 1.0, last)
+        patches = triangulate_patches(complex_, parameters.mesh_size, COARSE if trial else 1.0, last)
         stages.begin("surface", 0.12 + 0.05 * attempt)
         flat = cotangent_laplacian(patches.planar[patches.planar_faces], patches.faces, patches.count)
         vertices, spread = linear_surface(flat, patches.faces, points, normals, patches.lift)
-        if last is not None:
+        if not trial:
             if unrolled_well(patches, vertices, spread):
                 break
             vertices, spread = rebuilt_surface(vertices, patches.faces, points, normals, patches.lift)
-        last = (patches, vertices)
+        last, trial = (patches, vertices), False
     if parameters.soft is not None:
         points = _softened(complex_.network, patches, vertices, spread, parameters.soft)
         vertices = np.vstack([points, vertices[len(points) :]])
