@@ -7,6 +7,7 @@ import type {
   CurveUpdate,
   LiveReading,
   NetworkProblems,
+  NewToken,
   NodeProposals,
   Outline,
   Preview,
@@ -15,7 +16,10 @@ import type {
   Reconstruction,
   ReconstructionParameters,
   RecordingSummary,
+  Rights,
   Session,
+  Token,
+  TokenCreate,
 } from "../wire.gen";
 import { jsonLines } from "./lines";
 
@@ -42,6 +46,23 @@ export class Api {
     private readonly base = "/api/v1",
     private readonly fetcher: typeof fetch = (input, init) => fetch(input, init),
   ) {}
+
+  /** What this browser may do. */
+  rights(): Promise<Rights> {
+    return this.#json<Rights>("GET", "/rights");
+  }
+
+  tokens(session: string): Promise<Token[]> {
+    return this.#json<Token[]>("GET", `/tokens?session=${session}`);
+  }
+
+  createToken(wanted: Partial<TokenCreate>): Promise<NewToken> {
+    return this.#json<NewToken>("POST", "/tokens", JSON.stringify(wanted));
+  }
+
+  async revokeToken(id: string): Promise<void> {
+    await this.#request("DELETE", `/tokens/${id}`);
+  }
 
   sessions(): Promise<Session[]> {
     return this.#json<Session[]>("GET", `/sessions?limit=${MOST_SESSIONS}`);

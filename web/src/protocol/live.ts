@@ -25,6 +25,8 @@ const FIRST_PAUSE = 250;
 const LONGEST_PAUSE = 8000;
 /** Close code that tells that the session was deleted. */
 const SESSION_GONE = 4404;
+/** Close code that tells that the token was revoked or has expired. */
+const TOKEN_ENDED = 4401;
 
 /** Pause before the n-th attempt to connect again, ms. */
 export function pauseBefore(attempt: number): number {
@@ -76,7 +78,7 @@ export class LiveSocket {
 
   #lost(code: number): void {
     if (this.#closed) return;
-    if (code === SESSION_GONE) return this.close();
+    if (code === SESSION_GONE || code === TOKEN_ENDED) return this.close();
     this.handlers.state("waiting");
     this.#cancelRetry = this.surroundings.later(() => this.#connect(), pauseBefore(this.#attempt));
     this.#attempt += 1;

@@ -22,6 +22,7 @@ import { Latest } from "./latest";
 import { newName } from "./names";
 import { ParametersStore } from "./parameters.svelte";
 import { loadResult, type Report, type Result } from "./result";
+import { RightsStore } from "./rights.svelte";
 
 /** A curve as the list of curves names it. */
 export interface CurveEntry {
@@ -72,6 +73,7 @@ export class SessionStore {
   known = $state(false);
   /** Whether curves were scanned here, which may be edited; a network that was opened is as it is in its file. */
   scanned = $state(false);
+  readonly rights = new RightsStore();
   reconstruction = $state.raw<Reconstruction>();
   result = $state.raw<Result>();
   /** The network with parameters that a hand is moving. */
@@ -125,7 +127,7 @@ export class SessionStore {
 
   async open(): Promise<void> {
     await this.#attempt(async () => {
-      this.session = await this.api.session(this.id);
+      [this.session] = await Promise.all([this.api.session(this.id), this.rights.load(this.api)]);
       const url = socketUrl(`/api/v1/sessions/${this.id}/live`, location);
       this.#socket = new LiveSocket(url, { message: (m) => this.receive(m), state: (s) => (this.connection = s) });
       const latest = this.session.latest_reconstruction;

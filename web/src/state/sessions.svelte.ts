@@ -11,6 +11,8 @@ export class SessionsStore {
   search = $state("");
   problem = $state("");
   leaving = $state.raw<Session>();
+  /** Whether whoever looks may also change things. */
+  mayEdit = $state(true);
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(private readonly api: Api) {}
@@ -24,7 +26,11 @@ export class SessionsStore {
   }
 
   async load(): Promise<void> {
-    await this.#attempt(async () => (this.all = await this.api.sessions()));
+    await this.#attempt(async () => {
+      const [rights, all] = await Promise.all([this.api.rights(), this.api.sessions()]);
+      this.mayEdit = rights.role === "owner";
+      this.all = all;
+    });
   }
 
   /** A new session; undefined when the server refused (see `problem`). */
