@@ -13,8 +13,11 @@ TracemeshError
     ├── Changed           it is not any more what the request says that it is
     ├── Unavailable       another service that is needed does not answer: asking again later may help
     │   └── ClusterAway   the scheduler of the cluster that runs jobs
-    └── Refused           a device's message that is not taken: carries the code that the protocol has for it
+    ├── Refused           a device's message that is not taken: carries the code that the protocol has for it
+    └── Overtaken         another server on the same database was faster: says with which recordings
 """
+
+from collections.abc import Mapping
 
 MENDS = ("boundary", "interior", "open", "remove", "nodes")
 """What may be done to a curve: mark it as boundary, as interior or as open, leave it out, find its nodes."""
@@ -86,3 +89,12 @@ class Refused(ResourceError):  # noqa: N818 - the protocol's own word
         super().__init__(message)
         self.code = code
         self.expected_seq = expected_seq
+
+
+class Overtaken(ResourceError):  # noqa: N818 - nothing is broken
+    """Another server on the same database goes on with some recordings of a group, so that it cannot be stored."""
+
+    def __init__(self, reasons: Mapping[int, Refused]) -> None:
+        """`reasons`: why not, by the recording's key."""
+        super().__init__(f"another server was faster with {len(reasons)} recordings")
+        self.reasons = reasons

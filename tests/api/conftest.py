@@ -1,6 +1,7 @@
 """A real server in a thread of the test, and one in a process of its own that can be killed."""
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -27,6 +28,7 @@ class RunningServer:
 
     port: int
     token: str = ""
+    pid: int = 0
     http: httpx.Client = field(init=False)
 
     def __post_init__(self) -> None:
@@ -133,7 +135,7 @@ class ServerProcess:
         command += ["--host", host]
         self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL, **options)
         self._hang_up()
-        client = self.client = RunningServer(self.port)
+        client = self.client = RunningServer(self.port, pid=self.process.pid)
         while True:
             assert self.process.poll() is None, "the server did not start"
             try:
@@ -154,6 +156,21 @@ class ServerProcess:
             self.client.http.close()
 
 
+@pytest.fixture(scope="module")
+def start_processes() -> Iterator[Callable[..., list[RunningServer]]]:
+    """Start several servers on one folder and database; all are killed after the module."""
+    with ExitStack() as stack:
+
+        def start(count: int, folder: Path, database_url: str) -> list[RunningServer]:
+            processes = [ServerProcess(folder) for _ in range(count)]
+            for process in processes:
+                stack.callback(process.kill)
+            environment = {**os.environ, "TRACEMESH_DATABASE_URL": database_url}
+            return [process.start(env=environment) for process in processes]
+
+        yield start
+
+
 @pytest.fixture
 def server_process(tmp_path: Path) -> Iterator[ServerProcess]:
     """A server in a process of its own."""
@@ -163,14 +180,24 @@ def server_process(tmp_path: Path) -> Iterator[ServerProcess]:
 
 
 @pytest.fixture
-def ride(server: RunningServer) -> Iterator[Callable[..., Rider]]:
-    """Connect devices; all hang up after the test."""
+def ride_at() -> Iterator[Callable[..., Rider]]:
+    """Connect devices to a server; all hang up after the test."""
     with ExitStack() as stack:
 
-        def begin(recording: str, session: str | None = None, at: RunningServer | None = None, **device: Any) -> Rider:
-            return Rider(stack.enter_context((at or server).connect("/ingest")), recording, session, **device)
+        def begin(server: RunningServer, recording: str, session: str | None = None, **device: Any) -> Rider:
+            return Rider(stack.enter_context(server.connect("/ingest")), recording, session, **device)
 
         yield begin
+
+
+@pytest.fixture
+def ride(server: RunningServer, ride_at: Callable[..., Rider]) -> Callable[..., Rider]:
+    """Connect devices to the server of the test, or to another one."""
+
+    def begin(recording: str, session: str | None = None, at: RunningServer | None = None, **device: Any) -> Rider:
+        return ride_at(at or server, recording, session, **device)
+
+    return begin
 
 
 @pytest.fixture

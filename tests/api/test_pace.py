@@ -37,10 +37,10 @@ def test_whoever_keeps_below_the_rate_never_waits(rate: int, count: int) -> None
         assert pace.take(UNIT - 1) == 0.0
 
 
-def test_a_flood_does_not_keep_others_from_being_acknowledged(start_server: Any, ride: Any, line: Any) -> None:
+def test_a_flood_does_not_keep_others_from_being_acknowledged(start_server: Any, ride_at: Any, line: Any) -> None:
     """The flood would take twenty seconds; the other device is through long before, and nothing is refused."""
     server = start_server(max_device_rate=100)
-    flooding, polite = ride("flood", server.new_session(), at=server), ride("polite", server.new_session(), at=server)
+    flooding, polite = ride_at(server, "flood", server.new_session()), ride_at(server, "polite", server.new_session())
     messages = line(2100, block=1)
     flood = threading.Thread(target=_send_all, args=(flooding, messages))
     flood.start()

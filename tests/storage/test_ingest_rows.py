@@ -6,13 +6,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
+from sqlalchemy.orm import Session
 
-from tracemesh.errors import Refused
+from tracemesh.errors import Overtaken, Refused
 from tracemesh.storage.curves import list_curves
 from tracemesh.storage.database import Database
 from tracemesh.storage.ingest import Group, commit, open_recording
 from tracemesh.storage.models import MessageRow, RecordingRow, new_id
 from tracemesh.storage.recordings import recording_messages, recording_row
+from tracemesh.storage.sessions import delete_session
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.base import Count
 from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Recorded, Samples, Wheel
@@ -159,3 +161,66 @@ def test_the_same_recording_may_be_in_two_sessions(database: Database) -> None:
 def test_versions_must_meet(database: Database) -> None:
     with pytest.raises(Refused, match="version"), database.write() as transaction:
         open_recording(transaction, HELLO.model_copy(update={"versions": [7]}), b"")
+
+
+def opened(transaction: Session, hello: Hello, owner: str) -> RecordingState:
+    """A recording that a server has now."""
+    return open_recording(transaction, hello, hello.model_dump_json().encode(), owner)
+
+
+def started(state: RecordingState) -> Group:
+    """A group in which each recording starts a curve."""
+    group = Group()
+    message = CurveStart(seq=state.next_seq, curve=len(state.curves))
+    state.advance(message, 1)
+    group.add(state, message, b"x")
+    return group
+
+
+def test_what_another_server_goes_on_with_is_left_out_and_the_rest_is_stored(database: Database) -> None:
+    with database.write() as transaction:
+        moved = opened(transaction, HELLO, "first")
+        stays = opened(transaction, HELLO.model_copy(update={"recording": "s"}), "first")
+    with database.write() as transaction:
+        again = opened(transaction, HELLO, "second")
+        assert (again.taken_over, moved.taken_over) == (True, False)
+    group = started(moved)
+    for rows, others in zip(vars(group).values(), vars(started(stays)).values(), strict=True):
+        rows.extend(others) if isinstance(rows, list) else rows.update(others)
+    with pytest.raises(Overtaken) as overtaken, database.write() as transaction:
+        commit(transaction, group, "first")
+    assert {key: reason.code for key, reason in overtaken.value.reasons.items()} == {moved.key: "limit"}
+    group.drop(moved.key)
+    with database.write() as transaction:
+        commit(transaction, group, "first")
+        commit(transaction, started(again), "second")
+    with database.read() as transaction:
+        assert transaction.scalars(select(MessageRow.recording_key).order_by(MessageRow.recording_key)).all() == [
+            moved.key, stays.key,
+        ]  # fmt: skip
+
+
+def test_two_servers_never_give_two_curves_one_index(database: Database) -> None:
+    with database.write() as transaction:
+        one = opened(transaction, HELLO, "first")
+        hello = HELLO.model_copy(update={"recording": "s", "session": one.session.id})
+        two = opened(transaction, hello, "second")
+    with database.write() as transaction:
+        commit(transaction, started(one), "first")
+    with pytest.raises(Overtaken) as overtaken, database.write() as transaction:
+        commit(transaction, started(two), "second")
+    assert [(key, reason.code) for key, reason in overtaken.value.reasons.items()] == [(two.key, "storage")]
+    with database.write() as transaction:
+        two = opened(transaction, hello, "second")
+        commit(transaction, started(two), "second")
+    with database.read() as transaction:
+        assert [c.index for c in list_curves(transaction, one.session.id)] == [0, 1]
+
+
+def test_a_deleted_recording_is_told_to_whoever_still_sends_it(database: Database) -> None:
+    with database.write() as transaction:
+        state = opened(transaction, HELLO, "first")
+        delete_session(transaction, state.session.id)
+    with pytest.raises(Overtaken) as overtaken, database.write() as transaction:
+        commit(transaction, started(state), "first")
+    assert overtaken.value.reasons[state.key].code == "unknown"

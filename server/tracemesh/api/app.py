@@ -19,6 +19,7 @@ from tracemesh.api.compression import WeakTags
 from tracemesh.api.described import DescribedApi
 from tracemesh.api.errors import install_handlers
 from tracemesh.api.limits import BodyLimits
+from tracemesh.api.live.elsewhere import Elsewhere
 from tracemesh.api.live.hub import Hub
 from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
@@ -46,6 +47,8 @@ from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import ArtifactStore, open_artifacts
 from tracemesh.storage.database import Database
+from tracemesh.storage.exchange import Exchange, News
+from tracemesh.storage.models import new_id
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.device import Recorded
 from tracemesh.wire.resources import Problem, Reconstruction
@@ -119,19 +122,44 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
 
     def tell(reconstruction: Reconstruction) -> None:
         loop.call_soon_threadsafe(hub.progressed, reconstruction)
+        exchange.post(News("progressed", reconstruction.session, reconstruction.id))
 
-    metrics = Metrics()
-    recorder = Recorder(database, settings.max_session_bytes, observe, metrics)
+    def heard(news: News) -> None:
+        if news.kind in ("recorded", "edited"):
+            recorder.stored_elsewhere(news.session, news.number)
+            previewer.forget(news.session)
+        elsewhere.hear(news)
+
+    metrics, owner = Metrics(), new_id()
+    recorder = Recorder(database, settings.max_session_bytes, observe, metrics, owner)
     hub = Hub(database, settings.resolved_database_url, recorder.flush)
     metrics.watch("devices", "Devices connected", lambda: recorder.open_count)
     metrics.watch("watchers", "Browsers that watch a session", lambda: hub.watcher_count)
     previewer, comparer = Previewer(database, recorder.flush, settings.preview_memory), Comparer()
+    elsewhere = Elsewhere(database, hub)
+    exchange = Exchange(
+        database,
+        owner,
+        hear=lambda news: loop.call_soon_threadsafe(heard, news),
+        missed=lambda: loop.call_soon_threadsafe(elsewhere.missed),
+    )
     runner = JobRunner(settings, database, tell)
     store = open_artifacts(settings)
     tidying = asyncio.create_task(_collect_garbage(database, store))
     try:
         yield Services(
-            settings, database, store, recorder, hub, previewer, comparer, metrics, runner, loop, Tokens(database)
+            settings,
+            database,
+            store,
+            recorder,
+            hub,
+            previewer,
+            comparer,
+            metrics,
+            runner,
+            exchange,
+            loop,
+            Tokens(database),
         )
     finally:
         tidying.cancel()
@@ -140,6 +168,8 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
         await previewer.close()
         await comparer.close()
         await recorder.close()
+        await asyncio.to_thread(exchange.close)
+        await elsewhere.close()
         database.close()
 
 

@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
 
 from tracemesh.api.metrics import Metrics
-from tracemesh.errors import Refused
+from tracemesh.errors import Overtaken, Refused
 from tracemesh.storage.database import Database
+from tracemesh.storage.exchange import News, post
 from tracemesh.storage.ingest import Group, commit, open_recording
 from tracemesh.storage.sessions import delete_session
 from tracemesh.storage.states import RecordingState, SessionState
@@ -55,12 +57,16 @@ class Recorder:
         max_session_bytes: int,
         observer: Callable[[RecordingState, Recorded], None],
         metrics: Metrics,
+        owner: str,
     ) -> None:
-        """`observer` sees every message once, as soon as it is accepted; it must not wait."""
+        """`owner` tells this server from others on the same database.
+
+        `observer` sees every message once, as soon as it is accepted; it must not wait."""
         self._database = database
         self._max_session_bytes = max_session_bytes
         self._observer = observer
         self._metrics = metrics
+        self._owner = owner
         self._open: dict[int, tuple[RecordingState, Sender]] = {}
         self._deleting: set[str] = set()
         self._batch = _Batch()
@@ -86,27 +92,37 @@ class Recorder:
         """Begin or go on with a recording; another sender of the same one is cut off. Raises Refused."""
         async with self._lock:
             try:
-                state = await self._write(open_recording, hello, payload)
+                state = await self._write(open_recording, hello, payload, self._owner)
             except SQLAlchemyError:
                 log.exception("could not open recording %s", hello.recording)
                 raise _out_of_order() from None
             if state.session.id in self._deleting:
                 raise Refused("unknown", f"there is no session {state.session.id}")
+            elsewhere = Refused("limit", "the recording goes on over another connection")
+            if state.taken_over:
+                self._drop(state.key, elsewhere)
             if state.key in self._open:
                 state, before = self._open[state.key]
-                before.fail(Refused("limit", "the recording goes on over another connection"))
+                before.fail(elsewhere)
             else:
                 state.session = self._shared(state.session)
             self._open[state.key] = state, sender
             await self.flush()
             return state
 
-    async def leave(self, state: RecordingState, sender: Sender) -> None:
-        """The sender is gone; what it sent is committed first."""
+    async def leave(self, state: RecordingState, sender: Sender) -> bool:
+        """The sender is gone; what it sent is committed first. Whether nobody else sends the recording now."""
         async with self._lock:
             await self.flush()
             if state.key in self._open and self._open[state.key][1] is sender:
                 del self._open[state.key]
+            return state.key not in self._open
+
+    def stored_elsewhere(self, session: str, next_index: int) -> None:
+        """Another server gave away the indices of a session's curves below `next_index`."""
+        for state, _ in self._open.values():
+            if state.session.id == session:
+                state.session.catch_up(SessionState(session, next_index, 0, 0))
 
     def accept(self, state: RecordingState, message: Recorded, payload: bytes) -> None:
         """Take a message; one that was sent before is only acknowledged again. Raises Refused."""
@@ -145,7 +161,10 @@ class Recorder:
 
     def _shared(self, session: SessionState) -> SessionState:
         """One state for all recordings of a session, so that they do not give two curves one index."""
-        return next((state.session for state, _ in self._open.values() if state.session.id == session.id), session)
+        known = (state.session for state, _ in self._open.values() if state.session.id == session.id)
+        shared = next(known, session)
+        shared.catch_up(session)
+        return shared
 
     def _check_size(self, state: RecordingState, size: int) -> None:
         if state.session.bytes + size > self._max_session_bytes:
@@ -177,7 +196,7 @@ class Recorder:
     async def _commit(self, group: Group) -> None:
         try:
             with self._metrics.commits.time():
-                await self._write(commit, group)
+                await self._write_own(group)
         except Exception:
             log.exception("could not commit %d messages", len(group.messages))
             self._fail_all()
@@ -188,6 +207,31 @@ class Recorder:
                 state, sender = self._open[key]
                 state.committed = row.next_seq
                 sender.acknowledge(state.committed - 1)
+
+    async def _write_own(self, group: Group) -> None:
+        """Leaves out what another server was faster with."""
+        while group.reached:
+            try:
+                await self._write(self._store, group, self._news(group))
+                break
+            except Overtaken as news:
+                for key, reason in news.reasons.items():
+                    group.drop(key)
+                    self._drop(key, reason)
+
+    def _news(self, group: Group) -> list[News]:
+        states = (self._open[key][0] for key in group.reached if key in self._open)
+        return [News("recorded", s.session.id, str(s.key), s.session.next_index) for s in states]
+
+    def _store(self, transaction: Session, group: Group, news: list[News]) -> None:
+        commit(transaction, group, self._owner)
+        post(transaction, self._owner, news)
+
+    def _drop(self, key: int, reason: Refused) -> None:
+        self._batch.group.drop(key)
+        if key in self._open:
+            _, sender = self._open.pop(key)
+            sender.fail(reason)
 
     def _fail_all(self) -> None:
         """What is in memory runs ahead of what could be stored: everybody has to go back to what is durable."""

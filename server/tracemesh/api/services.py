@@ -20,6 +20,8 @@ from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import ArtifactStore
 from tracemesh.storage.database import Database
+from tracemesh.storage.exchange import Exchange, News
+from tracemesh.wire.resources import Reconstruction
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,18 @@ class Services:
     comparer: Comparer
     metrics: Metrics
     runner: JobRunner
+    exchange: Exchange
     loop: asyncio.AbstractEventLoop
     tokens: Tokens
 
+    def progressed(self, reconstruction: Reconstruction) -> None:
+        """A reconstruction changed; from any thread."""
+        self.loop.call_soon_threadsafe(self.hub.progressed, reconstruction)
+        self.exchange.post(News("progressed", reconstruction.session, reconstruction.id))
+
     def edited(self, session: str) -> None:
         """Curves or marks of a session were edited; from any thread."""
+        self.exchange.post(News("edited", session))
         self.loop.call_soon_threadsafe(self.previewer.forget, session)
         self.loop.call_soon_threadsafe(self.hub.edited, session)
 

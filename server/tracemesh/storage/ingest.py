@@ -1,12 +1,12 @@
 """From accepted messages to committed rows: many devices' messages in one transaction, acknowledged only after it."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sqlalchemy import bindparam, delete, func, insert, select, update
 from sqlalchemy.orm import Session
 
-from tracemesh.errors import Refused
+from tracemesh.errors import Overtaken, Refused
 from tracemesh.storage.devices import add_calibration, corrected_hello, seen
 from tracemesh.storage.models import CurveRow, MarkRow, MessageRow, ReadingRow, RecordingRow, SessionRow, new_id
 from tracemesh.storage.states import CurveState, RecordingState, SessionState
@@ -14,7 +14,7 @@ from tracemesh.wire.arrays import ArrayReading
 from tracemesh.wire.base import PROTOCOL_VERSION
 from tracemesh.wire.device import CurveEnd, CurveStart, Hello, NodeMark, OfCurve, Recorded
 
-Row = dict[str, object]
+Row = dict[str, Any]
 MARK = ("recording_key", "number", "sample", "node")
 """What tells a mark from others."""
 
@@ -80,9 +80,28 @@ class Group:
         """Have the recording acknowledged with this group, though it may add nothing to it."""
         self.reached[state.key] = Reached(state.key, state.next_seq, state.bytes)
 
+    def drop(self, key: int) -> None:
+        """Leave a recording out after all."""
+        for rows in (self.messages, self.starts, self.marks, self.unmarks, self.ends, self.readings):
+            rows[:] = [
+                row
+                for row in rows
+                if key not in (row.get("recording_key"), row.get("at_key"), row.get("at_recording_key"))
+            ]
+        for curve in [curve for curve in self.travelled if curve[0] == key]:
+            del self.travelled[curve]
+        self.reached.pop(key, None)
 
-def commit(session: Session, group: Group) -> None:
-    """Write all rows of a group; the caller commits."""
+
+def commit(session: Session, group: Group, owner: str = "") -> None:
+    """Write all rows of a group; the caller commits.
+
+    Raises Overtaken when another server than `owner` has a recording now, or gave a new curve's index away.
+    """
+    _lock_sessions(session, [*group.starts, *group.readings])
+    _check_indices(session, group.starts)
+    _number(session, group.readings)
+    _reach(session, group, owner)
     connection = session.connection()
     this_curve = (CurveRow.recording_key == bindparam("at_key")) & (CurveRow.number == bindparam("at_number"))
     statements = (
@@ -93,18 +112,56 @@ def commit(session: Session, group: Group) -> None:
         (update(CurveRow).where(this_curve), list(group.travelled.values())),
         (update(CurveRow).where(this_curve), group.ends),
         (insert(ReadingRow), group.readings),
-        (
-            update(RecordingRow).where(RecordingRow.key == bindparam("at_key")),
-            [r._asdict() for r in group.reached.values()],
-        ),
     )
     for statement, rows in statements:
         if rows:
             connection.execute(statement, rows)
 
 
-def open_recording(session: Session, hello: Hello, payload: bytes) -> RecordingState:
-    """The recording that a hello names, made when it is new.
+def _lock_sessions(session: Session, rows: list[Row]) -> None:
+    """No other server starts a curve or counts a reading in these sessions until this transaction ends."""
+    for identifier in sorted({row["session_id"] for row in rows}):  # all servers lock them in the same order
+        session.execute(select(SessionRow.id).where(SessionRow.id == identifier).with_for_update(key_share=True))
+
+
+def _number(session: Session, readings: list[Row]) -> None:
+    """Go on from the last reading that is stored: another server may count those of the same session, too."""
+    for identifier in {row["session_id"] for row in readings}:
+        last = session.scalar(select(func.max(ReadingRow.index)).where(ReadingRow.session_id == identifier))
+        own = [row for row in readings if row["session_id"] == identifier]
+        for index, row in enumerate(own, 0 if last is None else last + 1):
+            row["index"] = index
+
+
+def _check_indices(session: Session, starts: list[Row]) -> None:
+    identifiers = {row["session_id"] for row in starts}
+    if not identifiers:
+        return
+    taken = set(
+        session.execute(select(CurveRow.session_id, CurveRow.index).where(CurveRow.session_id.in_(identifiers)))
+    )
+    again = Refused("storage", "another server started a curve in the same session; connect again")
+    if reasons := {row["recording_key"]: again for row in starts if (row["session_id"], row["index"]) in taken}:
+        raise Overtaken(reasons)
+
+
+def _reach(session: Session, group: Group, owner: str) -> None:
+    own = (RecordingRow.key == bindparam("at_key")) & (RecordingRow.owner == bindparam("at_owner"))
+    rows = [{**reached._asdict(), "at_owner": owner} for reached in group.reached.values()]
+    if rows and session.connection().execute(update(RecordingRow).where(own), rows).rowcount != len(rows):
+        present = select(RecordingRow.key, RecordingRow.owner).where(RecordingRow.key.in_(group.reached))
+        owners = dict(session.execute(present).all())
+        raise Overtaken({key: _why_not(owners.get(key)) for key in group.reached if owners.get(key) != owner})
+
+
+def _why_not(owner: str | None) -> Refused:
+    if owner is None:
+        return Refused("unknown", "the recording was deleted")
+    return Refused("limit", "the recording goes on over another connection")
+
+
+def open_recording(session: Session, hello: Hello, payload: bytes, owner: str = "") -> RecordingState:
+    """The recording that a hello names, made when it is new; from now on only `owner` may write into it.
 
     Raises Refused when no version of the protocol is common or the session that the hello names does not exist.
     """
@@ -112,6 +169,8 @@ def open_recording(session: Session, hello: Hello, payload: bytes) -> RecordingS
         raise Refused("version", f"this server speaks version {PROTOCOL_VERSION}, the device speaks {hello.versions}")
     seen(session, hello.device)
     row = _find(session, hello) or _create(session, hello, payload)
+    before, row.owner = row.owner, owner
+    session.flush()
     return RecordingState(
         key=row.key,
         session=_session_state(session, row.session_id),
@@ -120,6 +179,7 @@ def open_recording(session: Session, hello: Hello, payload: bytes) -> RecordingS
         committed=row.next_seq,
         bytes=row.bytes,
         curves=_curve_states(session, row.key),
+        taken_over=before not in ("", owner),
     )
 
 
@@ -127,8 +187,8 @@ def _find(session: Session, hello: Hello) -> RecordingRow | None:
     """A hello without a session goes on with the recording for which the server made one."""
     query = select(RecordingRow).where(RecordingRow.id == hello.recording)
     if hello.session is None:
-        return session.scalar(query.where(RecordingRow.made_session))
-    return session.scalar(query.where(RecordingRow.session_id == hello.session))
+        return session.scalar(query.where(RecordingRow.made_session).with_for_update())
+    return session.scalar(query.where(RecordingRow.session_id == hello.session).with_for_update())
 
 
 def _create(session: Session, hello: Hello, payload: bytes) -> RecordingRow:

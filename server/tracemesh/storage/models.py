@@ -88,6 +88,8 @@ class RecordingRow(Base):
 
     `calibration` is the version of its device's calibration that corrects it, if one was chosen.
 
+    `owner` is the server that took it last: no other one may write into it.
+
     A key is never used twice: whoever holds the key of a deleted recording must not write into another one.
     """
 
@@ -99,6 +101,7 @@ class RecordingRow(Base):
     session_id: Mapped[str] = mapped_column(ForeignKey("sessions.id", ondelete="CASCADE"))
     hello: Mapped[bytes] = mapped_column(LargeBinary)
     made_session: Mapped[bool] = mapped_column(default=False)
+    owner: Mapped[str] = mapped_column(String(16), default="", server_default="")
     next_seq: Mapped[int] = mapped_column(Long, default=0)
     bytes: Mapped[int] = mapped_column(Long, default=0)
     created: Mapped[datetime] = mapped_column(UtcTime, default=now)

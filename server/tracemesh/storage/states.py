@@ -30,10 +30,19 @@ class SessionState:
     next_reading: int
     bytes: int
 
+    def catch_up(self, stored: "SessionState") -> None:
+        """Other servers may have added to what is stored."""
+        self.next_index = max(self.next_index, stored.next_index)
+        self.next_reading = max(self.next_reading, stored.next_reading)
+        self.bytes = max(self.bytes, stored.bytes)
+
 
 @dataclass(eq=False)
 class RecordingState:
-    """A recording as accepted so far; `committed` messages of it are durable."""
+    """A recording as accepted so far; `committed` messages of it are durable.
+
+    `taken_over`: another server, or this one before it was started again, had it last.
+    """
 
     key: int
     session: SessionState
@@ -42,6 +51,7 @@ class RecordingState:
     committed: int
     bytes: int
     curves: dict[int, CurveState] = field(default_factory=dict)
+    taken_over: bool = False
 
     def check(self, message: Recorded) -> None:
         """Raise Refused when the message does not fit what came before it."""

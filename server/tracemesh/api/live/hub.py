@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections import defaultdict
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
 
 from tracemesh.api.live.client import Client
@@ -19,7 +19,7 @@ from tracemesh.storage.readings import StoredReading, newest_readings
 from tracemesh.storage.reconstructions import list_reconstructions
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.arrays import ArrayReading
-from tracemesh.wire.device import Recorded, Samples
+from tracemesh.wire.device import Hello, Recorded, Samples
 from tracemesh.wire.resources import Reconstruction
 
 log = logging.getLogger(__name__)
@@ -81,6 +81,43 @@ class Hub:
         if session in self._rooms:
             self._rooms[session].reload()
 
+    def is_watched(self, session: str) -> bool:
+        """Whether somebody watches."""
+        return session in self._rooms
+
+    @property
+    def watched(self) -> list[str]:
+        """Sessions that somebody watches."""
+        return list(self._rooms)
+
+    async def wanted(self, session: str, key: int) -> int | None:
+        """Number of the first message of a recording that watchers have not seen; None while nobody watches."""
+        return await self._rooms[session].next_seq(key) if session in self._rooms else None
+
+    def accepted_elsewhere(
+        self, session: str, key: int, hello: Hello, news: Sequence[Accepted | StoredReading]
+    ) -> None:
+        """Show what another server stored."""
+        if session not in self._rooms:
+            return
+        room, meter = self._rooms[session], self._meters[session].setdefault(key, Meter(hello, is_here=False))
+        meter.connected = True
+        for item in news:
+            if isinstance(item, StoredReading):
+                meter.add(item.reading)
+                room.show(item)
+                room.passed(key, item.reading.seq)
+            else:
+                if isinstance(item.message, Samples):
+                    meter.add(item.message)
+                room.take(item)
+
+    def left_elsewhere(self, session: str, key: int) -> None:
+        """A device has left another server."""
+        meter = self._meters.get(session, {}).get(key)
+        if meter is not None and not meter.is_here:
+            meter.connected = False
+
     def progressed(self, reconstruction: Reconstruction) -> None:
         """A reconstruction changed."""
         if reconstruction.session in self._rooms:
@@ -103,7 +140,8 @@ class Hub:
             await room.close()
 
     def _forget_lost(self, session: str) -> None:
-        kept = {key: meter for key, meter in self._meters.pop(session, {}).items() if meter.connected}
+        meters = self._meters.pop(session, {})
+        kept = {key: meter for key, meter in meters.items() if meter.connected and meter.is_here}
         if kept:
             self._meters[session] = kept
 

@@ -20,8 +20,9 @@ WINDOW = 1.0
 class Meter:
     """Counts samples as they arrive; reads their values only when asked."""
 
-    def __init__(self, hello: Hello) -> None:
-        """Nothing arrived yet."""
+    def __init__(self, hello: Hello, is_here: bool = True) -> None:
+        """Nothing arrived yet; `is_here`: the device is connected to this server, not to another one."""
+        self.is_here = is_here
         self._hello = hello
         self._began = self._last = monotonic()
         self._arrivals: deque[tuple[float, int]] = deque(maxlen=1000)

@@ -99,6 +99,15 @@ class Room:
         self._stale = True
         self._changed.set()
 
+    async def next_seq(self, key: int) -> int:
+        """Number of the first message of a recording that is not drawn yet."""
+        await self._loaded.wait()
+        return self._tracker.next_seq(key)
+
+    def passed(self, key: int, seq: int) -> None:
+        """A message of a recording was shown otherwise."""
+        self._tracker.passed(key, seq)
+
     def tell(self, reconstruction: Reconstruction) -> None:
         """A reconstruction made progress."""
         self._reconstruction = reconstruction

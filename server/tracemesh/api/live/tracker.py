@@ -51,6 +51,14 @@ class SessionTracker:
                 changes += [change for a in run for change in self._event(a)]
         return changes
 
+    def next_seq(self, key: int) -> int:
+        """Number of the first message of a recording that was not taken yet."""
+        return self._next_seq.get(key, 0)
+
+    def passed(self, key: int, seq: int) -> None:
+        """A message was taken care of that draws no curve."""
+        self._next_seq[key] = max(self.next_seq(key), seq + 1)
+
     def settle(self, solved: SolvedNetwork) -> LiveNetwork:
         """Draw what was solved as solved, the rest from there on."""
         self._nodes.update(solved.nodes)

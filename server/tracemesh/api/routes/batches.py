@@ -100,7 +100,7 @@ def cancel(batch: Identifier, services: UseServices) -> Batch:
     with services.database.write() as transaction:
         changed, stopped = batches.cancel_batch(transaction, batch)
     for reconstruction in stopped:
-        services.loop.call_soon_threadsafe(services.hub.progressed, reconstruction)
+        services.progressed(reconstruction)
     return changed
 
 

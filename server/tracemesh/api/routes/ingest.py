@@ -12,6 +12,7 @@ from tracemesh.api.services import Services, UsePrincipal, UseServices
 from tracemesh.api.sockets import first_to_end
 from tracemesh.errors import Refused
 from tracemesh.storage.devices import proposal
+from tracemesh.storage.exchange import News
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.base import PROTOCOL_VERSION
 from tracemesh.wire.device import Ack, ErrorMessage, Hello, Recorded, Welcome, from_device
@@ -74,6 +75,7 @@ class _Connection:
             raise Refused("limit", f"{self._services.settings.max_devices} devices are connected already")
         self._state = await self._services.recorder.open(hello, payload, self)
         self._services.hub.connected(self._state)
+        self._services.exchange.post(News("recorded", self._state.session.id, str(self._state.key)))
         known = await asyncio.to_thread(self._known_calibration, self._state.key)
         session, next_seq = self._state.session.id, self._state.next_seq
         await self._send(Welcome(version=PROTOCOL_VERSION, session=session, next_seq=next_seq, calibration=known))
@@ -108,8 +110,11 @@ class _Connection:
     async def leave(self) -> None:
         """Give up the recording."""
         if self._state is not None:
-            self._services.hub.disconnected(self._state)
-            await self._services.recorder.leave(self._state, self)
+            if await self._services.recorder.leave(self._state, self):
+                self._services.hub.disconnected(self._state)
+                self._services.exchange.post(News("left", self._state.session.id, str(self._state.key)))
+            if self.failure is not None:  # what is drawn may not be what is stored
+                self._services.edited(self._state.session.id)
 
     async def _read(self, state: RecordingState) -> None:
         recorder = self._services.recorder

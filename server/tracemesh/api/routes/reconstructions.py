@@ -46,7 +46,7 @@ async def span(session: Identifier, request: Request, services: UseServices, res
 
 def _queued(services: Services, response: Response, made: Reconstruction) -> Reconstruction:
     services.runner.wake()
-    services.loop.call_soon_threadsafe(services.hub.progressed, made)
+    services.progressed(made)
     response.headers["Location"] = f"/api/v1/reconstructions/{made.id}"
     return made
 
@@ -82,7 +82,7 @@ def cancel(reconstruction: Identifier, services: UseServices) -> Reconstruction:
     """Stop it: at once while it is queued, after its present stage when it runs; 409 when it has ended."""
     with services.database.write() as transaction:
         stopped = reconstructions.request_cancel(transaction, reconstruction)
-    services.loop.call_soon_threadsafe(services.hub.progressed, stopped)
+    services.progressed(stopped)
     return stopped
 
 

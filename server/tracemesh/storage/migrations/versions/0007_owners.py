@@ -1,0 +1,13 @@
+"""Which of several servers a recording's device sends to."""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0007"
+down_revision = "0006"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.add_column("recordings", sa.Column("owner", sa.String(16), nullable=False, server_default=""))

@@ -1,0 +1,161 @@
+"""Two server processes on one PostgreSQL: it does not matter at which one a device or a browser is."""
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+
+@pytest.fixture(scope="module")
+def team(
+    start_processes: Callable[..., list[Any]], new_database: Callable[[str], str], tmp_path_factory: Any
+) -> list[Any]:
+    """Two servers that share a database and a folder."""
+    return start_processes(2, tmp_path_factory.mktemp("team"), new_database("postgresql"))
+
+
+@pytest.fixture
+def watch() -> Iterator[Callable[..., Callable[..., list[dict[str, Any]]]]]:
+    """Watch a session at a server; what is returned reads until a message fulfils a condition."""
+    with ExitStack() as stack:
+
+        def begin(server: Any, session: str) -> Callable[..., list[dict[str, Any]]]:
+            socket = stack.enter_context(server.connect(f"/sessions/{session}/live"))
+
+            def until(condition: Callable[[dict[str, Any]], bool]) -> list[dict[str, Any]]:
+                seen = [json.loads(socket.recv(timeout=60))]
+                while not condition(seen[-1]):
+                    seen.append(json.loads(socket.recv(timeout=60)))
+                return seen
+
+            until(lambda m: m["type"] == "live.snapshot")
+            return until
+
+        yield begin
+
+
+def deliver(servers: list[Any], session: str, recording: str, messages: list[dict[str, Any]]) -> None:
+    """Send a recording as a bridge does, at another server whenever a connection ends."""
+    hello = {"type": "hello", "recording": recording, "session": session, "device": {"id": "d", "kind": "test"}}
+    acknowledged, attempt = -1, 0
+    while acknowledged < len(messages) - 1:
+        with suppress(ConnectionClosed, OSError), servers[attempt % len(servers)].connect("/ingest") as socket:
+            socket.send(json.dumps(hello))
+            answer = json.loads(socket.recv(timeout=60))
+            for message in messages[answer.get("next_seq", len(messages)) :]:
+                socket.send(json.dumps(message))
+            while answer["type"] != "error" and acknowledged < len(messages) - 1:
+                answer = json.loads(socket.recv(timeout=60))
+                acknowledged = answer.get("seq", acknowledged)
+        attempt += 1
+
+
+def rides(line: Any, curves: int) -> list[dict[str, Any]]:
+    """Several short curves, one after another, numbered on."""
+    messages: list[dict[str, Any]] = []
+    for curve in range(curves):
+        messages += line(20, curve=curve, first_seq=len(messages))
+    return messages
+
+
+def stored(server: Any, session: str, recording: str) -> list[dict[str, Any]]:
+    lines = server.http.get(f"/sessions/{session}/recordings/{recording}").text.splitlines()
+    return [json.loads(text) for text in lines[1:]]
+
+
+def test_what_is_recorded_at_one_server_is_seen_at_the_other(team: Any, line: Any, ride_at: Any, watch: Any) -> None:
+    here, there = team
+    session = here.new_session()
+    views = [watch(here, session), watch(there, session)]
+    rider = ride_at(here, "seen", session)
+    messages = line(300)
+    for message in messages:
+        rider.send(message)
+    rider.wait_for_ack(len(messages) - 1)
+    seen = [view(lambda m: m["type"] == "live.curve.end") for view in views]
+    drawn = [
+        {m["first"] + i: m["positions"][3 * i : 3 * i + 3] for m in messages if m["type"] == "live.points"
+         for i in range(len(m["positions"]) // 3)}
+        for messages in seen
+    ]  # fmt: skip
+    assert len(drawn[0]) == 100
+    assert drawn[0] == drawn[1]
+    views[1](lambda m: m["type"] == "live.device" and m["recording"] == "seen" and m["state"] != "lost")
+    rider.socket.close()
+    views[1](lambda m: m["type"] == "live.device" and m["recording"] == "seen" and m["state"] == "lost")
+
+
+def test_edits_and_progress_at_one_server_are_seen_at_the_other(team: Any, line: Any, watch: Any) -> None:
+    here, there = team
+    session = here.new_session()
+    deliver([here], session, "edited", line(50))
+    view = watch(there, session)
+    here.http.patch(f"/sessions/{session}/curves/0", json={"boundary": True})
+    (edited,) = view(lambda m: m["type"] == "live.snapshot")[-1]["curves"]
+    assert edited["boundary"]
+    job = here.http.post(f"/sessions/{session}/reconstructions").json()["id"]
+
+    def is_its_end(message: dict[str, Any]) -> bool:
+        ours = message["type"] == "live.reconstruction" and message["reconstruction"]["id"] == job
+        return ours and message["reconstruction"]["state"] not in ("queued", "running")
+
+    view(is_its_end)
+    assert here.http.delete(f"/sessions/{session}").status_code == 204
+    with pytest.raises(ConnectionClosed):
+        view(lambda m: False)
+
+
+def test_devices_at_both_servers_draw_into_one_session(team: Any, line: Any) -> None:
+    """No two curves get one index, whoever starts them; everything is stored once and in order."""
+    session = team[0].new_session()
+    messages = rides(line, 15)
+    with ThreadPoolExecutor(2) as devices:
+        sent = [devices.submit(deliver, [server], session, f"at-{server.port}", messages) for server in team]
+        for one in sent:
+            one.result()
+    curves = team[0].http.get(f"/sessions/{session}/curves").json()
+    assert sorted(c["index"] for c in curves) == list(range(30))
+    assert all(c["samples"] == 20 for c in curves)
+    for server in team:
+        assert stored(team[0], session, f"at-{server.port}") == messages
+
+
+def test_a_device_may_go_on_at_the_other_server(team: Any, line: Any, ride_at: Any) -> None:
+    """Its first connection may live on, half open: what comes over it now is not taken."""
+    here, there = team
+    session = here.new_session()
+    messages = line(200)
+    old = ride_at(here, "moved", session)
+    for message in messages[:5]:
+        old.send(message)
+    old.wait_for_ack(4)
+    new = ride_at(there, "moved", session)
+    assert new.welcome["next_seq"] == 5
+    old.send(messages[5])
+    answer = old.receive()
+    assert (answer["type"], answer["code"]) == ("error", "limit")
+    for message in messages[5:]:
+        new.send(message)
+    new.wait_for_ack(len(messages) - 1)
+    assert stored(here, session, "moved") == messages
+
+
+def test_a_device_whose_server_is_killed_goes_on_at_the_other(
+    start_processes: Any, new_database: Any, tmp_path: Path, line: Any
+) -> None:
+    team = start_processes(2, tmp_path, new_database("postgresql"))
+    session = team[0].new_session()
+    messages = line(3000, block=5)
+    with ThreadPoolExecutor(1) as device:
+        sent = device.submit(deliver, team, session, "r", messages)
+        while team[1].http.get(f"/sessions/{session}").json()["samples"] < 100:
+            pass
+        os.kill(team[0].pid, 9)
+        sent.result()
+    assert stored(team[1], session, "r") == messages
