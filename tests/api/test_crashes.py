@@ -7,11 +7,14 @@ import signal
 import subprocess
 import threading
 import time
+from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed
+
+from tracemesh.storage import models
 
 
 def test_nothing_acknowledged_is_lost_and_the_device_goes_on(server_process: Any, line: Any) -> None:
@@ -169,6 +172,42 @@ def test_postgresql_crashes_under_a_device(start_server: Any, new_database: Any,
                     crashes += 1
     assert crashes == 2
     assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
+
+
+def test_a_clock_that_is_set_back_loses_nothing(
+    start_server: Any, ride_at: Any, line: Any, shared_data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Recordings go on and stay in order, jobs end; only the times themselves tell of it."""
+    server = start_server()
+    session = server.new_session()
+    messages = line(100)
+    rider = ride_at(server, "first", session)
+    for message in messages[:6]:
+        rider.send(message)
+    rider.wait_for_ack(5)
+    monkeypatch.setattr(models, "datetime", _AnHourAgo)
+    for name, begin in (("first", 6), ("second", 0)):
+        rider = ride_at(server, name, session)
+        assert rider.welcome["next_seq"] == begin
+        for message in messages[begin:]:
+            rider.send(message)
+        rider.wait_for_ack(len(messages) - 1)
+        stored = server.http.get(f"/sessions/{session}/recordings/{name}").text.splitlines()[1:]
+        assert [json.loads(text) for text in stored] == messages
+    first, second = server.http.get(f"/sessions/{session}/recordings").json()
+    assert (first["id"], second["id"]) == ("first", "second")
+    assert second["created"] < first["created"]
+    scanned = server.new_session()
+    scan = (shared_data / "scans" / "cone-noisy.rawnet").read_bytes()
+    server.http.post(f"/sessions/{scanned}/recordings", content=scan)
+    job = _wait(server, server.http.post(f"/sessions/{scanned}/reconstructions").json()["id"])
+    assert (job["state"], job["created"] < first["created"]) == ("done", True)
+
+
+class _AnHourAgo:
+    @staticmethod
+    def now(zone: tzinfo) -> datetime:
+        return datetime.now(zone) - timedelta(hours=1)
 
 
 def _small_files() -> None:

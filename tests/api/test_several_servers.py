@@ -2,6 +2,7 @@
 
 import json
 import os
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
@@ -54,6 +55,7 @@ def deliver(servers: list[Any], session: str, recording: str, messages: list[dic
                 answer = json.loads(socket.recv(timeout=60))
                 acknowledged = answer.get("seq", acknowledged)
         attempt += 1
+        time.sleep(0.05)
 
 
 def rides(line: Any, curves: int) -> list[dict[str, Any]]:
@@ -111,8 +113,12 @@ def test_edits_and_progress_at_one_server_are_seen_at_the_other(team: Any, line:
         view(lambda m: False)
 
 
-def test_devices_at_both_servers_draw_into_one_session(team: Any, line: Any) -> None:
-    """No two curves get one index, whoever starts them; everything is stored once and in order."""
+@pytest.mark.parametrize("kind", ["sqlite", "postgresql"])
+def test_devices_at_both_servers_draw_into_one_session(
+    kind: str, start_processes: Any, new_database: Any, tmp_path: Path, line: Any
+) -> None:
+    """No two curves get one index, whoever starts them; everything is stored once and in order, on SQLite, too."""
+    team = start_processes(2, tmp_path, new_database(kind))
     session = team[0].new_session()
     messages = rides(line, 15)
     with ThreadPoolExecutor(2) as devices:
@@ -144,6 +150,21 @@ def test_a_device_may_go_on_at_the_other_server(team: Any, line: Any, ride_at: A
         new.send(message)
     new.wait_for_ack(len(messages) - 1)
     assert stored(here, session, "moved") == messages
+
+
+def test_postgresql_crashes_under_two_servers_and_their_devices(team: Any, postgresql: Any, line: Any) -> None:
+    session = team[0].new_session()
+    messages = line(2000, block=5)
+    with ThreadPoolExecutor(4) as devices:
+        sent = [devices.submit(deliver, [team[i % 2]], session, f"r{i}", messages) for i in range(4)]
+        for samples in (500, 3000):
+            while (now := team[0].http.get(f"/sessions/{session}")).is_error or now.json()["samples"] < samples:
+                pass
+            postgresql.crash()
+        for one in sent:
+            one.result()
+    for i in range(4):
+        assert stored(team[0], session, f"r{i}") == messages
 
 
 def test_a_device_whose_server_is_killed_goes_on_at_the_other(

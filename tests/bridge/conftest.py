@@ -7,6 +7,7 @@ own, and so is the bridge, because both must be killed.
 import asyncio
 import contextlib
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -148,6 +149,40 @@ def wait_until(condition: Callable[[], object], what: str = "") -> None:
     raise AssertionError(f"never happened: {what or condition}")
 
 
+class Cable:
+    """A TCP connection to a server that can be cut: both ends stay open, nothing comes through."""
+
+    def __init__(self, port: int) -> None:
+        self.cut = False
+        self._to = port
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listening.getsockname()[1]
+        self.address = f"http://127.0.0.1:{self.port}"
+        self._ends: list[socket.socket] = []
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def close(self) -> None:
+        for end in (self._listening, *self._ends):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                near, _ = self._listening.accept()
+                far = socket.create_connection(("127.0.0.1", self._to))
+                self._ends += [near, far]
+                for a, b in ((near, far), (far, near)):
+                    threading.Thread(target=self._carry, args=(a, b), daemon=True).start()
+
+    def _carry(self, a: socket.socket, b: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while data := a.recv(65536):
+                if not self.cut:
+                    b.sendall(data)
+
+
 PATIENT = ("--rate", "500", "--timeout", "2")
 """A busy computer is no fault of the device."""
 
@@ -280,3 +315,10 @@ def bench(tmp_path: Path, server: RecordingServer) -> Iterator[Bench]:
         yield bench
     finally:
         bench.close()
+
+
+@pytest.fixture
+def new_cable() -> Iterator[Callable[[int], Cable]]:
+    """Lays cables to ports."""
+    with contextlib.ExitStack() as stack:
+        yield lambda port: stack.enter_context(contextlib.closing(Cable(port)))

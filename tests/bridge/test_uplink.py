@@ -1,9 +1,6 @@
 """The uplink against a real WebSocket server that misbehaves."""
 
 import asyncio
-import socket
-import threading
-from contextlib import suppress
 
 import pytest
 
@@ -165,44 +162,11 @@ def test_an_address_that_is_none_is_refused(typed):
         ingest_url(typed)
 
 
-class Cable:
-    """A TCP connection to a server that can be cut: both ends stay open, nothing comes through."""
-
-    def __init__(self, port):
-        self.cut = False
-        self._to = port
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.address = f"http://127.0.0.1:{self._listening.getsockname()[1]}"
-        self._ends = []
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def close(self):
-        for end in (self._listening, *self._ends):
-            with suppress(OSError):
-                end.shutdown(socket.SHUT_RDWR)
-            end.close()
-
-    def _accept(self):
-        with suppress(OSError):
-            while True:
-                near, _ = self._listening.accept()
-                far = socket.create_connection(("127.0.0.1", self._to))
-                self._ends += [near, far]
-                for a, b in ((near, far), (far, near)):
-                    threading.Thread(target=self._carry, args=(a, b), daemon=True).start()
-
-    def _carry(self, a, b):
-        with suppress(OSError):
-            while data := a.recv(65536):
-                if not self.cut:
-                    b.sendall(data)
-
-
-def test_a_network_that_swallows_everything_is_noticed_and_nothing_is_lost(spool, server, monkeypatch):
+def test_a_network_that_swallows_everything_is_noticed_and_nothing_is_lost(spool, server, monkeypatch, new_cable):
     monkeypatch.setattr(module, "PING_INTERVAL", 0.1)
     monkeypatch.setattr(module, "PING_TIMEOUT", 0.2)
     monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.5)
-    cable = Cable(server.port)
+    cable = new_cable(server.port)
     fill(spool, 50)
 
     def cut_and_mend(said):
@@ -214,6 +178,5 @@ def test_a_network_that_swallows_everything_is_noticed_and_nothing_is_lost(spool
         return len(server.stored.get("r", ())) == 550
 
     said = run(spool, cable.address, until=cut_and_mend)
-    cable.close()
     assert "server: lost: the connection broke" in said
     assert [m.seq for m in server.stored["r"]] == list(range(550))

@@ -1,5 +1,8 @@
 """A database of any earlier schema is brought up to date, and every row in it is kept."""
 
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from datetime import UTC, datetime
@@ -7,13 +10,32 @@ from typing import Any
 
 import pytest
 from alembic.script import ScriptDirectory
-from sqlalchemy import Column, Connection, MetaData, select
+from sqlalchemy import Column, Connection, MetaData, event, select
 
 from tracemesh.storage.database import Database, migrations
 from tracemesh.storage.devices import list_devices
+from tracemesh.storage.models import SessionRow
 
 REVISIONS = [script.revision for script in ScriptDirectory.from_config(migrations()).walk_revisions()]
 VALUES: dict[type, Any] = {str: "x", int: 3, float: 0.5, bool: True, bytes: b"{}", object: {"a": 1}}
+
+KILLED = """
+import os, sys
+from sqlalchemy import event
+from tracemesh.storage.database import Database
+
+database, left = Database(sys.argv[1]), int(sys.argv[2])
+
+@event.listens_for(database.engine, "before_cursor_execute")
+def count(*_):
+    global left
+    left -= 1
+    if left < 0:
+        os.kill(os.getpid(), 9)
+
+database.migrate()
+"""
+"""Migrates a database and kills itself before a certain statement."""
 
 Rows = dict[str, dict[str, Any]]
 
@@ -66,6 +88,34 @@ def test_every_row_of_an_earlier_schema_is_kept(
             (found,) = connection.execute(select(*kept)).mappings()
             told = {column: v.replace(tzinfo=UTC) if isinstance(v, datetime) else v for column, v in found.items()}
             assert told == {column.name: row[column.name] for column in kept}, name
+
+
+def statements(database: Database) -> int:
+    """How many statements a migration takes."""
+    executed: list[object] = []
+    event.listen(database.engine, "before_cursor_execute", lambda *_: executed.append(_))
+    database.migrate()
+    return len(executed)
+
+
+@pytest.mark.parametrize("kind", ["sqlite", "postgresql"])
+def test_whoever_is_killed_in_a_migration_leaves_the_schema_as_it_was(
+    kind: str, new_database: Callable[[str], str], databases: Callable[[str], Database]
+) -> None:
+    first = REVISIONS[-1]
+    trial, database = databases(new_database(kind)), databases(url := new_database(kind))
+    trial.migrate(first)
+    database.migrate(first)
+    with database.engine.begin() as connection:
+        fill(connection)
+    total = statements(trial)
+    for survived in (total // 3, 2 * total // 3, total - 1):
+        killed = subprocess.run([sys.executable, "-c", KILLED, url, str(survived)])
+        assert killed.returncode == -signal.SIGKILL
+        assert database.versions()[0] == first
+    database.migrate()
+    with database.read() as transaction:
+        assert len(transaction.scalars(select(SessionRow)).all()) == 1
 
 
 def test_devices_of_earlier_recordings_are_known(database_url: str, databases: Callable[[str], Database]) -> None:
