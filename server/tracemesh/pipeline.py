@@ -304,6 +304,7 @@ def network_parameters(parameters: ReconstructionParameters) -> NetworkParameter
         bend=parameters.bend,
         weights=parameters.weights,
         curve_bias=parameters.curve_bias,
+        robust=parameters.robust,
     )
 
 

@@ -122,6 +122,17 @@ def test_standard_input_and_a_network_only(shared_data: Path, tmp_path: Path) ->
     assert [p.name for p in tmp_path.iterdir()] == ["network.json"]
 
 
+def test_a_robust_loss_bears_frames_that_are_pure_chance(shared_data: Path, tmp_path: Path) -> None:
+    lines = (shared_data / "lilium.rawnet").read_text().splitlines()
+    rows = [k for k, line in enumerate(lines) if len(line.split()) == 7]
+    for k in rows[5::20]:
+        lines[k] = f"{lines[k].split()[0]} 0.6 0.8 0 -0.8 0.6 0"
+    output = ("-o", tmp_path / "no.glb", "--report", tmp_path / "report.json", "--no-surface", "--robust")
+    done = tracemesh("reconstruct", "-", *output, stdin="\n".join(lines))
+    assert done.returncode == 0, done.stderr
+    assert json.loads((tmp_path / "report.json").read_text())["network"]["parameters"]["robust"] is True
+
+
 def lilium_with(change: str, text: str) -> str:
     """The author's file with one fault."""
     lines = text.splitlines()

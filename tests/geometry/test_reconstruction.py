@@ -1,7 +1,7 @@
 """The curve half end to end: known truth, convergence, what must not matter, and scans that cannot be used."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -329,6 +329,50 @@ def test_an_empty_scan_and_senseless_parameters_are_refused() -> None:
             reconstruct_network(exact(), NetworkParameters(**wrong))
     with pytest.raises(ScanError, match="more than 5000000 samples"):
         reconstruct_network(exact(), NetworkParameters(step=1e-9))
+
+
+def test_lengths_of_vectors_do_not_matter() -> None:
+    scan, random, curves = exact(), np.random.default_rng(0), []
+    for curve in scan.curves:
+        along, up = random.uniform(1e-6, 1e6, (2, len(curve.distance), 1))
+        curves.append(replace(curve, tangent=along * curve.tangent, normal=up * curve.normal))
+    one, other = (reconstruct_network(s, FIXED).network.points for s in (scan, Scan(tuple(curves))))
+    np.testing.assert_allclose(other, one, rtol=0, atol=1e-9)
+
+
+def test_a_node_on_one_curve_only_is_a_node() -> None:
+    scan = exact()
+    curve = scan.curves[1]
+    middle = (curve.node_samples[0] + curve.node_samples[1]) // 2
+    samples, nodes = np.insert(curve.node_samples, 1, middle), np.insert(curve.node_ids, 1, 999)
+    lonely = with_curve(scan, 1, node_samples=samples, node_ids=nodes)
+    one, other = (reconstruct_network(s, FIXED).network for s in (scan, lonely))
+    assert (len(other.nodes), len(other.segments)) == (len(one.nodes) + 1, len(one.segments) + 1)
+
+
+def looped(count: int, turns: float, node_samples: Sequence[int] = (), node_ids: Sequence[int] = ()) -> Scan:
+    """A flat curve that turns to and fro by so many turns either way: with more than a half it crosses itself."""
+    arc = np.linspace(0, 1, count)
+    angle = turns * np.sin(2 * np.pi * arc) * 2 * np.pi
+    tangent = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    normal = np.tile([0.0, 0.0, 1.0], (count, 1))
+    return Scan((CurveScan(arc, tangent, normal, np.array(node_samples, int), np.array(node_ids, int)),))
+
+
+@pytest.mark.parametrize("turns", [0.4, 1.3])
+def test_a_curve_may_cross_itself_with_or_without_a_node_there(turns: float) -> None:
+    network = reconstruct_network(looped(2000, turns)).network
+    assert len(network.nodes) == 2
+    again = reconstruct_network(looped(2000, turns, (0, 400, 1500, 1999), (0, 1, 1, 2))).network
+    assert len(again.nodes) == 3
+    assert np.isfinite(again.points).all()
+
+
+def test_a_million_samples() -> None:
+    network = reconstruct_network(looped(1_000_000, 0.4), NetworkParameters(step=0.004)).network
+    assert len(network.points) == 251
+    few = reconstruct_network(looped(20_000, 0.4), NetworkParameters(step=0.004)).network
+    np.testing.assert_allclose(network.points, few.points, atol=1e-5)
 
 
 @settings(max_examples=40, deadline=None)

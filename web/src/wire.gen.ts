@@ -678,6 +678,10 @@ export interface ReconstructionParameters {
    */
   reading: number | null;
   /**
+   * bear several percent of frames that are pure chance
+   */
+  robust: boolean;
+  /**
    * let the surface leave a noisy network a little
    */
   soft: boolean;
@@ -879,6 +883,10 @@ export interface PreviewWish {
    * of a fixed array: number of the reading within the session; none: the last one
    */
   reading: number | null;
+  /**
+   * bear several percent of frames that are pure chance
+   */
+  robust: boolean;
   /**
    * let the surface leave a noisy network a little
    */

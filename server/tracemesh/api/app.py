@@ -56,6 +56,22 @@ from tracemesh.wire.resources import Problem, Reconstruction
 log = logging.getLogger(__name__)
 TIDY_INTERVAL = 3600.0
 """s between two searches for artifacts that nobody needs."""
+ROUTES = (
+    archives,
+    batches,
+    sessions,
+    curves,
+    recordings,
+    readings,
+    proposals,
+    comparisons,
+    reconstructions,
+    devices,
+    ingest,
+    live,
+    networks,
+    tokens,
+)
 PROBLEMS: dict[int | str, dict[str, Any]] = {status: {"model": Problem} for status in (401, 403, 404, 409, 422)}
 
 
@@ -85,23 +101,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     install_handlers(app)
     api = APIRouter(prefix="/api/v1", responses=PROBLEMS)
-    routes = (
-        archives,
-        batches,
-        sessions,
-        curves,
-        recordings,
-        readings,
-        proposals,
-        comparisons,
-        reconstructions,
-        devices,
-        ingest,
-        live,
-        networks,
-        tokens,
-    )
-    for module in routes:
+    for module in ROUTES:
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(pages.router)

@@ -36,12 +36,7 @@ def add_reconstruct(commands: Commands) -> None:
         "--step", type=step, default="1.6%", help="distance of points: %% of the diagonal, or m (default 1.6%%)"
     )
     _add_mesh_size(parser)
-    parser.add_argument("--stretch", type=float, metavar="L2", help="smoothing length of the stretch term, m (auto)")
-    parser.add_argument("--bend", type=float, metavar="L4", help="smoothing length of the bend term, m (auto)")
-    parser.add_argument("--weights", choices=("auto", "thesis"), default="auto", help="smoothing (default auto)")
-    parser.add_argument(
-        "--curve-bias", choices=("auto", "on", "off"), default="auto", help="fit heading and scale per curve (auto)"
-    )
+    _add_smoothing(parser)
     parser.add_argument(
         "--length",
         type=length,
@@ -50,6 +45,32 @@ def add_reconstruct(commands: Commands) -> None:
         metavar="CURVE:SEGMENT=M",
         help="length of a segment that you measured, both counted from 1; may be repeated",
     )
+    _add_origin(parser)
+    parser.add_argument(
+        "--reading",
+        type=seed,
+        metavar="N",
+        help="of a fixed array's recording: which reading, from 0 (default the last)",
+    )
+    parser.add_argument("--infer-nodes", action="store_true", help="find the nodes that are not marked")
+    parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
+    parser.add_argument("--no-surface", action="store_true", help="stop after the network; MESH is then not written")
+    parser.set_defaults(command=_reconstruct)
+
+
+def _add_smoothing(parser: argparse.ArgumentParser) -> None:
+    """How noise and errors of whole curves are dealt with."""
+    parser.add_argument("--stretch", type=float, metavar="L2", help="smoothing length of the stretch term, m (auto)")
+    parser.add_argument("--bend", type=float, metavar="L4", help="smoothing length of the bend term, m (auto)")
+    parser.add_argument("--weights", choices=("auto", "thesis"), default="auto", help="smoothing (default auto)")
+    parser.add_argument(
+        "--curve-bias", choices=("auto", "on", "off"), default="auto", help="fit heading and scale per curve (auto)"
+    )
+    parser.add_argument("--robust", action="store_true", help="bear several percent of frames that are pure chance")
+
+
+def _add_origin(parser: argparse.ArgumentParser) -> None:
+    """Where readings come from: the field of the place, the device's own errors."""
     field = parser.add_mutually_exclusive_group()
     field.add_argument(
         "--place", type=place, metavar="LAT,LON", help="degrees; the magnetic field there (--place=-33.9,151.2)"
@@ -61,16 +82,6 @@ def add_reconstruct(commands: Commands) -> None:
     parser.add_argument(
         "--calibration", metavar="CAL.json", help="of the device, as tracemesh-bridge calibrate writes it"
     )
-    parser.add_argument(
-        "--reading",
-        type=seed,
-        metavar="N",
-        help="of a fixed array's recording: which reading, from 0 (default the last)",
-    )
-    parser.add_argument("--infer-nodes", action="store_true", help="find the nodes that are not marked")
-    parser.add_argument("--soft", action="store_true", help="let the surface leave a noisy network a little")
-    parser.add_argument("--no-surface", action="store_true", help="stop after the network; MESH is then not written")
-    parser.set_defaults(command=_reconstruct)
 
 
 def add_surface(commands: Commands) -> None:
@@ -122,6 +133,7 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
         bend=chosen.bend,
         weights=chosen.weights,
         curve_bias=chosen.curve_bias,
+        robust=chosen.robust,
         infer_nodes=chosen.infer_nodes,
         soft=chosen.soft,
         surface=not chosen.no_surface,

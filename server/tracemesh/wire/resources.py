@@ -208,6 +208,7 @@ class ReconstructionParameters(Message):
     bend: float | None = Field(default=None, ge=0, description="smoothing length of the bend term, m")
     weights: Literal["auto", "thesis"] = "auto"
     curve_bias: Literal["auto", "on", "off"] = "auto"
+    robust: bool = Field(default=False, description="bear several percent of frames that are pure chance")
     infer_nodes: bool = Field(
         default=False, description="find the nodes that are not marked; those marked already are kept"
     )

@@ -67,7 +67,7 @@ class Equations:
     shared: csc_array
 
     def part(self, rows: Ints, columns: Ints) -> "Equations":
-        """Only some equations and only some of theta."""
+        """Only some equations, rows (k,), and only some of theta, columns (l,)."""
         free = self.free.tocsr()[rows].tocsc()
         used = np.flatnonzero(np.diff(free.indptr))
         return Equations(self.y[rows], free[:, used], self.shared.tocsr()[rows].tocsc()[:, columns])
@@ -195,7 +195,7 @@ class Misclosures:
         return rates
 
     def sample(self, most_marks: int) -> tuple[tuple[Equations, Equations], Ints, Ints]:
-        """Equations between at most about `most_marks` marks that lie together, and the curves and marks in them."""
+        """Equations between at most about `most_marks` marks that lie together; their curves (k,) and marks (l,)."""
         layout = self.layout
         chosen = _neighbourhood(layout, most_marks)
         inside = chosen[layout.segment_nodes].all(axis=1)

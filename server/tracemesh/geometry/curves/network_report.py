@@ -16,7 +16,10 @@ _MOST = 3  # warnings; one wrong node number spoils its neighbours too
 
 
 def bias_report(closing: Closing | None, indices: Ints) -> dict[str, object]:
-    """Errors of whole curves as found; evidence: logarithm of how much likelier they make the network."""
+    """Errors of whole curves as found; indices: (c,) of the curves in the scan.
+
+    evidence: logarithm of how much likelier they make the network.
+    """
     if closing is None or not closing.variances.with_bias:
         return {"on": False, "evidence": closing.gain if closing else None}
     variances, corrections = closing.variances, closing.corrections

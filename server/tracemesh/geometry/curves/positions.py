@@ -39,7 +39,7 @@ def segment_vectors(layout: Layout, edges: Floats) -> Floats:
 
 
 def check_connected(layout: Layout, curve_indices: Ints) -> None:
-    """Raise PiecesError, naming them, unless all curves hang together at nodes."""
+    """Raise PiecesError unless all curves hang together at nodes; curve_indices: (c,) by which it names them."""
     ends = layout.segment_nodes
     ones = np.ones(len(ends))
     graph = coo_array((ones, (ends[:, 0], ends[:, 1])), shape=(layout.node_count, layout.node_count))

@@ -175,6 +175,7 @@ class NetworkReconstruction:
                 "step_m": self._step,
                 "stretch_m": weights.stretch,
                 "bend_m": weights.bend,
+                "robust": self._parameters.robust,
                 "curve_bias": "on" if self._closed and self._closed.found.variances.with_bias else "off",
                 "tangents": "chords to the next sample" if measured.is_polyline else "tangents of the curve",
             },

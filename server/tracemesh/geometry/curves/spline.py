@@ -39,7 +39,7 @@ class Offsets:
     weight: Floats
 
     def part(self, chosen: Ints) -> "Offsets":
-        """Only some of the samples."""
+        """Only the chosen samples (k,)."""
         return Offsets(self.value[chosen], self.row[chosen], self.fraction[chosen], self.weight[chosen])
 
     def predicted(self, offset: Floats) -> Floats:

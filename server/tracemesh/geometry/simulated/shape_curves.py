@@ -28,7 +28,7 @@ class Line:
         return self.start + parameter[:, None] * along, np.broadcast_to(along, (len(parameter), len(along)))
 
     def parameter(self, point: Floats) -> float:
-        """Parameter of the point of the line next to `point`."""
+        """Parameter of the point of the line next to `point` (d,)."""
         along = self.end - self.start
         return float((point - self.start) @ along / (along @ along))
 
@@ -48,13 +48,13 @@ class Circle:
         return self.centre + cos * self.first + sin * self.second, 2 * np.pi * (cos * self.second - sin * self.first)
 
     def parameter(self, point: Floats) -> float:
-        """Parameter (0 <= p < 1) of the point of the circle next to `point`."""
+        """Parameter, from 0 to less than 1, of the point of the circle next to `point` (d,)."""
         from_centre = point - self.centre
         turn = float(np.arctan2(from_centre @ self.second, from_centre @ self.first) / (2 * np.pi)) % 1.0
         return 0.0 if turn > 1 - 1e-9 else turn  # a node at the start, one rounding error before it
 
     def starting_at(self, point: Floats) -> "Circle":
-        """The same circle, begun at the point of it next to `point`."""
+        """The same circle, begun at the point of it next to `point` (d,)."""
         (first,), (along,) = self.at(np.array([self.parameter(point)]))
         return Circle(self.centre, first - self.centre, along / (2 * np.pi))
 

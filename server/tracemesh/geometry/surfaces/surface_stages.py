@@ -97,7 +97,7 @@ def finished(
     refinement: dict[str, object],
     stages: Stages,
 ) -> SurfaceResult:
-    """Mesh and report. refinement: what the report says about it."""
+    """Mesh and report. vertices: (n, 3) m. normals: (n, 3). refinement: what the report says about it."""
     stages.end()
     faces, boundary = patches.faces, boundary_vertices(patches.faces, patches.count)
     curvature = extended_to_boundary(mean_curvature(vertices, faces, normals), faces, boundary)
@@ -108,13 +108,13 @@ def finished(
 def linear_patches(
     complex_: CellComplex, parameters: SurfaceParameters, stages: Stages
 ) -> tuple[PatchMesh, Floats, Floats]:
-    """Patches, vertices and normals of the linear surface."""
+    """Patches, vertices (n, 3), m, and normals (n, 3) of the linear surface."""
     patches, flat = unrolled_patches(complex_, parameters, stages)
     return patches, *settled(complex_, patches, flat, stages)
 
 
 def unrolled_patches(complex_: CellComplex, parameters: SurfaceParameters, stages: Stages) -> tuple[PatchMesh, Floats]:
-    """Patches and vertices: over projected patches, then, unless all are nearly flat, over the same unrolled."""
+    """Patches and vertices (n, 3), m: over projected patches, then, unless all are nearly flat, over these unrolled."""
     points, normals = complex_.network.points, complex_.network.normals
     last, trial = None, not nearly_flat(complex_)
     for attempt in range(LARGEST_UNROLLS + 1):
@@ -137,7 +137,10 @@ def unrolled_patches(complex_: CellComplex, parameters: SurfaceParameters, stage
 def settled(
     complex_: CellComplex, patches: PatchMesh, flat: Floats, stages: Stages, rebuilds: int = REBUILDS
 ) -> tuple[Floats, Floats]:
-    """Vertices and normals of the linear surface that a first one leads to. Raises SurfaceError if a patch is lost."""
+    """Vertices (n, 3), m, and normals (n, 3) of the linear surface that a first one, flat (n, 3), leads to.
+
+    Raises SurfaceError if a patch is lost.
+    """
     stages.begin("rebuild", 0.6)
     normals = complex_.network.normals
     vertices, spread = settled_surface(flat, patches.faces, normals, patches.lift, rebuilds)
