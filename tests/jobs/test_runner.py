@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from sqlalchemy import update
@@ -227,4 +228,18 @@ def test_an_artifact_store_that_is_away_is_told(start: Start, settings: Settings
     assert failed.state == "failed"
     assert failed.error == "its files could not be stored: Not a directory; try again"
     settings.artifact_dir.unlink()
+    assert wait(database, queue(database)).state == "done"
+
+
+@embedded
+@pytest.mark.usefixtures("quick_lease")
+@pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
+def test_a_database_that_crashes_under_a_job_costs_at_most_an_attempt(
+    start: Start, database: Database, postgresql: Any
+) -> None:
+    job = queue(database, step=LONG)
+    start()
+    wait_until_it_works(database, job)
+    postgresql.crash()
+    assert wait(database, job).state == "done"
     assert wait(database, queue(database)).state == "done"

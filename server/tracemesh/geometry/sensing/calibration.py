@@ -15,6 +15,8 @@ from tracemesh.geometry.sensing.calibration_ellipsoid import Correction, SensorF
 from tracemesh.geometry.sensing.odometry import distance_from_ticks
 from tracemesh.geometry.sensing.orientation import angles_between
 
+SHORTEST_RUN = 1e-3
+"""m; a shorter one was not measured with a ruler."""
 LEAST_TURNS = 3.0
 """Of the wheel, in a straight run; its ends are known to about a tick and the ruler's length to about 1 mm."""
 MOST_BACK = 0.02
@@ -73,8 +75,8 @@ def wheel_circumference(ticks: Ints, length: float, ticks_per_turn: int) -> floa
     ticks: (n, 2) turns and parts of a turn, from the run's first to its last. Raises ScanError where the wheel turned
     less than LEAST_TURNS times, or went back.
     """
-    if not (np.isfinite(length) and length > 0):
-        raise ScanError(f"wanted the length of the run in metres, got {length:g}")
+    if not (np.isfinite(length) and length >= SHORTEST_RUN):
+        raise ScanError(f"wanted the length of the run in metres, at least {SHORTEST_RUN:g}, got {length:g}")
     turns = distance_from_ticks(ticks, 1.0, ticks_per_turn) if len(ticks) else np.zeros(1)
     turned = float(abs(turns[-1] - turns[0]))
     if turned < LEAST_TURNS:
