@@ -12,6 +12,7 @@ from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
 
 from tracemesh.errors import InputError
+from tracemesh.logs import LogFormat
 
 LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 """Hosts that only this machine reaches."""
@@ -44,6 +45,7 @@ class Settings(BaseSettings):
         default="",
         description="addresses or networks of reverse proxies, with commas; their X-Forwarded-... is believed",
     )
+    log_format: LogFormat = Field(default="text", description="text, or json: one object a line")
     executor: str = Field(
         default="embedded", description="where jobs run: embedded, in processes of the server, or dask://HOST:PORT"
     )

@@ -24,6 +24,7 @@ from tracemesh.api.live.hub import Hub
 from tracemesh.api.metrics import Metrics
 from tracemesh.api.preview import Previewer
 from tracemesh.api.recorder import Recorder
+from tracemesh.api.request_log import RequestLog
 from tracemesh.api.routes import (
     archives,
     batches,
@@ -93,6 +94,7 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
         swagger_ui_oauth2_redirect_url=None,
         middleware=[
+            Middleware(RequestLog),
             Middleware(Gate, settings=settings),
             Middleware(BodyLimits),
             Middleware(WeakTags),

@@ -2,11 +2,11 @@
 
 import asyncio
 import gc
-import logging
 import socket
 
 import uvicorn
 
+from tracemesh import logs
 from tracemesh.api.app import create_app
 from tracemesh.api.lan.serving import Lan
 from tracemesh.api.limits import PatientHttp
@@ -32,8 +32,7 @@ def serve(settings: Settings) -> None:
 
     Raises ResourceError when the data folder, the database or the address cannot be used.
     """
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    logging.getLogger("alembic").setLevel(logging.WARNING)
+    logs.set_up(settings.log_format)
     _prepare(settings)
     _collect_garbage_seldom()
     lan = Lan(settings) if settings.lan else None

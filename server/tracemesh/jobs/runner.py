@@ -15,6 +15,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from tracemesh.errors import ClusterAway, NotFound
 from tracemesh.jobs.executor import Worker, make_workers
 from tracemesh.jobs.work import load_kernel, work
+from tracemesh.logs import about
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import open_artifacts
 from tracemesh.storage.database import Database
@@ -101,7 +102,8 @@ class JobRunner:
         if claim is None:
             return False
         with self._holding(claim):
-            self._run(worker, claim)
+            with about(job=claim.id):
+                self._run(worker, claim)
             self._tell(claim, None)
         return True
 
