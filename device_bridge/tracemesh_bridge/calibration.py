@@ -54,6 +54,7 @@ class Procedure:
         self._faces: dict[str, Vector] = {}
         self._ticks: list[tuple[int, int]] = []
         self._count = 0
+        self._stride = 1
 
     @property
     def over(self) -> bool:
@@ -70,14 +71,19 @@ class Procedure:
         if reading.acceleration is None or reading.magnetic is None:
             return ""
         self._count += 1
-        if self._step == 0 and len(self._acceleration) < MAX_READINGS:
+        if self._step == 0 and self._count % self._stride == 0:
             self._acceleration.append(reading.acceleration)
             self._magnetic.append(reading.magnetic)
+            if len(self._acceleration) >= MAX_READINGS:  # from now on every other one of them
+                del self._acceleration[::2], self._magnetic[::2]
+                self._stride *= 2
         elif self._step == 1:
             self._recent.append(reading.acceleration)
             return self._new_face() if self._count % LOOK_EVERY == 0 else ""
-        elif self._step == 3 and reading.ticks is not None and len(self._ticks) < MAX_READINGS:
+        elif self._step == 3 and reading.ticks is not None:
             self._ticks.append(reading.ticks)
+            if len(self._ticks) >= MAX_READINGS:
+                del self._ticks[1:-1:2]
         return ""
 
     def enter(self) -> None:

@@ -10,6 +10,7 @@ from tracemesh.errors import ScanError
 from tracemesh.geometry.simulated.calibration_ride import LENGTH, CalibrationPlan
 from tracemesh.geometry.simulated.simulation import Imperfections
 from tracemesh.wire.device import Device, Wheel
+from tracemesh_bridge import calibration as module
 from tracemesh_bridge.calibration import FACES, ROLL, TURN, Procedure, describe
 from tracemesh_bridge.cli import main
 from tracemesh_bridge.errors import OperatorMistake
@@ -53,6 +54,17 @@ def test_an_operator_who_does_as_told_gets_a_calibration():
     assert found.place == "the lab"
     assert "6 faces, a run of 1 m" in found.source
     assert "wheel: 0.1" in describe(found)[-1]
+
+
+def test_however_long_it_takes_all_directions_count(monkeypatch):
+    monkeypatch.setattr(module, "MAX_READINGS", 500)
+    procedure = Procedure(RIDER, LENGTH)
+    led_through(procedure, noise=0.0)
+    found = procedure.result()
+    assert int(found.source.split()[0]) < 500
+    assert found.magnetometer.coverage == 1.0
+    np.testing.assert_allclose(found.magnetometer.offset, HARD, atol=1e-3)
+    assert found.circumference == pytest.approx(0.1, rel=0.002)
 
 
 def test_the_status_counts_directions_around_the_middle_of_what_came():

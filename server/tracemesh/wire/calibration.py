@@ -10,8 +10,8 @@ from pydantic import AwareDatetime, Field, model_validator
 
 from tracemesh.wire.base import Identifier, Message, Name, UnitQuaternion, Vector
 
-MAX_READINGS = 100_000
-"""Most readings of which a calibration is made."""
+MAX_READINGS = 20_000
+"""Most readings of which a calibration is made: more make it slower, not better."""
 Version = Annotated[int, Field(ge=1, le=2**31 - 1)]
 """Calibrations of a device are numbered 1, 2, 3, ... as they come; no number is used twice."""
 Run = list[tuple[int, int]]
