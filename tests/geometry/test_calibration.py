@@ -142,12 +142,39 @@ def test_a_device_at_rest_is_not_enough() -> None:
     ("vectors", "words"),
     [
         (np.ones((10, 3)), r"at least 50 vectors \(n, 3\), got an array of shape \(10, 3\)"),
-        (np.full((100, 3), np.nan), "reading 1 is not finite"),
+        (np.full((100, 3), np.nan), "reading 1 is not finite, or larger"),
     ],
 )
 def test_what_is_no_reading_is_refused(vectors: Floats, words: str) -> None:
     with pytest.raises(ScanError, match=words):
         fit_sensor(vectors, "accelerometer")
+
+
+def test_readings_of_many_fields_are_refused() -> None:
+    random = np.random.default_rng(1)
+    vectors = random.standard_normal((500, 3)) * random.uniform(0.1, 3.0, (500, 1))
+    with pytest.raises(ScanError, match="wanted readings of one field"):
+        fit_sensor(vectors, "magnetometer")
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    scale=st.sampled_from([0.0, 1e-300, 1e-12, 1.0, 1e8, 1e300]),
+    odd=st.lists(st.tuples(*[st.sampled_from([0.0, -1.0, 1e-200, 1e8, 1e300])] * 3), max_size=40),
+    faces=st.none()
+    | st.lists(st.tuples(*[st.sampled_from([0.0, 1.0, -1.0, 1e-200, 1e300])] * 3), min_size=1, max_size=7),
+)
+def test_whatever_is_measured_is_fitted_or_refused(
+    scale: float, odd: list[tuple[float, ...]], faces: list[tuple[float, ...]] | None
+) -> None:
+    vectors = scale * poses(80).apply(UP)
+    vectors[: len(odd)] = np.array(odd).reshape(-1, 3)
+    try:
+        fit = fit_calibration(vectors, vectors[::-1].copy(), None if faces is None else np.array(faces))
+    except ScanError:
+        return
+    assert np.isfinite(fit.alignment).all()
+    assert np.isfinite(fit.accelerometer.correction.matrix).all()
 
 
 def test_coverage_counts_directions_whatever_their_length() -> None:

@@ -14,7 +14,8 @@ MAX_READINGS = 20_000
 """Most readings of which a calibration is made: more make it slower, not better."""
 Version = Annotated[int, Field(ge=1, le=2**31 - 1)]
 """Calibrations of a device are numbered 1, 2, 3, ... as they come; no number is used twice."""
-Run = list[tuple[int, int]]
+Ticks = Annotated[int, Field(ge=-(2**31), le=2**31 - 1)]
+Run = list[tuple[Ticks, Ticks]]
 """Wheel ticks [big (turns), small], in order."""
 
 
@@ -75,8 +76,8 @@ class StraightRun(Message):
     """A straight run whose length a ruler measured."""
 
     ticks: Run = Field(min_length=2, max_length=MAX_READINGS)
-    ticks_per_turn: int = Field(default=500, gt=0)
-    length: float = Field(gt=0, description="m")
+    ticks_per_turn: int = Field(default=500, gt=0, le=10**6)
+    length: float = Field(ge=1e-3, le=1e4, description="m")
 
 
 class CalibrationReadings(Message):

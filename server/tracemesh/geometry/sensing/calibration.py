@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracemesh.errors import ScanError
+from tracemesh.geometry.rotations import normalized
 from tracemesh.geometry.scan import Floats, Ints
 from tracemesh.geometry.sensing.calibration_alignment import alignment, face_rotation
-from tracemesh.geometry.sensing.calibration_ellipsoid import Correction, SensorFit, fit_sensor
+from tracemesh.geometry.sensing.calibration_ellipsoid import LARGEST, Correction, SensorFit, fit_sensor
 from tracemesh.geometry.sensing.odometry import distance_from_ticks
 from tracemesh.geometry.sensing.orientation import angles_between
 
@@ -55,7 +56,7 @@ def fit_calibration(acceleration: Floats, magnetic: Floats, faces: Floats | None
     after = angles_between(a, m @ turn.T)
     before = angles_between(acceleration[both], magnetic[both])
     if faces is not None:
-        case = face_rotation(up.correction(faces) / np.linalg.norm(up.correction(faces), axis=1, keepdims=True))
+        case = face_rotation(_directions(up.correction(faces)))
         up = SensorFit(
             Correction(case @ up.correction.matrix, up.correction.offset),
             up.coverage, up.spread_before, up.spread_after, up.used,
@@ -63,6 +64,17 @@ def fit_calibration(acceleration: Floats, magnetic: Floats, faces: Floats | None
         turn = case @ turn
     dip = float(np.median(after)) - np.pi / 2
     return CalibrationFit(up, field, turn, dip, _robust_deviation(before), _robust_deviation(after))
+
+
+def _directions(faces: Floats) -> Floats:
+    """Unit vectors (k, 3)."""
+    size = np.abs(faces).max(axis=1, initial=0.0)
+    bad = ~((size > 1e-9) & (size < LARGEST))
+    if bad.any():
+        raise ScanError(
+            f"the acceleration on face {int(bad.argmax()) + 1} is zero, not finite or larger than {LARGEST:g}"
+        )
+    return normalized(faces)
 
 
 def _robust_deviation(values: Floats) -> float:

@@ -29,8 +29,9 @@ class Coverage:
 
 
 def coverage(vectors: Floats) -> Coverage:
-    """Which directions vectors (n, 3) have; zero and not finite ones count for nothing."""
-    good = vectors[np.isfinite(vectors).all(axis=1) & vectors.any(axis=1)]
+    """Which directions vectors (n, 3) have; ones without length or of no finite one count for nothing."""
+    size = np.abs(vectors).max(axis=1, initial=0.0)
+    good = vectors[(size > 1e-150) & (size < 1e150)]
     nearest = (normalized(good) @ DIRECTIONS.T).argmax(axis=1)
     seen = np.zeros(len(DIRECTIONS), bool)
     seen[nearest] = True

@@ -18,6 +18,10 @@ from tracemesh.geometry.sensing.calibration_coverage import Coverage, coverage
 LEAST_COVERAGE = 0.7
 """Of all directions; with less, what the unseen side is like is a guess."""
 LEAST_READINGS = 50
+LARGEST = 1e9
+"""More than any sensor's unit makes of what it measures."""
+MOST_SPREAD = 0.15
+"""Of the lengths, corrected; a field that varies as much is not one field."""
 MOST_UNCERTAIN = 20.0
 """Standard deviation of the parameter known worst over that of one reading, times the root of their number."""
 GATE = 5.0
@@ -70,13 +74,17 @@ def fit_sensor(vectors: Floats, name: str) -> SensorFit:
             break
         used = believed
     found = coverage(vectors if uncertain else (vectors - offset) @ matrix)
-    if uncertain or found.fraction < LEAST_COVERAGE:
+    if found.fraction < LEAST_COVERAGE or (uncertain and found.missing):
         raise ScanError(
             f"{name}: wanted readings with at least {LEAST_COVERAGE:.0%} of all directions of the device upwards or "
             f"along the field, got {found.fraction:.0%}; turn it so that these are measured, too: {found.in_words()}"
         )
     correction = Correction(matrix / np.cbrt(np.linalg.det(matrix)), offset)
     before, after = (_spread(v[used]) for v in (vectors, correction(vectors)))
+    if uncertain or after > MOST_SPREAD:
+        raise ScanError(
+            f"{name}: wanted readings of one field, got vectors whose lengths vary however they are corrected"
+        )
     return SensorFit(correction, found, before, after, used)
 
 
@@ -85,9 +93,9 @@ def _check(vectors: Floats, name: str) -> None:
         raise ScanError(
             f"{name}: wanted at least {LEAST_READINGS} vectors (n, 3), got an array of shape {vectors.shape}"
         )
-    bad = ~np.isfinite(vectors).all(axis=1)
+    bad = ~(np.abs(vectors).max(axis=1) < LARGEST)
     if bad.any():
-        raise ScanError(f"{name}: reading {int(bad.argmax()) + 1} is not finite")
+        raise ScanError(f"{name}: reading {int(bad.argmax()) + 1} is not finite, or larger than {LARGEST:g}")
 
 
 def _sphere_of(vectors: Floats) -> tuple[Floats, Floats, bool]:
@@ -95,7 +103,11 @@ def _sphere_of(vectors: Floats) -> tuple[Floats, Floats, bool]:
     middle, radius = _nearest_sphere(vectors)
     start = np.concatenate([np.ones(3), np.zeros(6)])
     unit = (vectors - middle) / radius
-    found = least_squares(_residual, start, _jacobian, method="lm", xtol=1e-15, args=(unit,))
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            found = least_squares(_residual, start, _jacobian, method="lm", xtol=1e-15, args=(unit,))
+    except FloatingPointError:  # no sphere, however large, is the nearest
+        return np.eye(3) / radius, middle, True
     matrix, offset = _symmetric(found.x), found.x[6:]
     if np.linalg.eigvalsh(matrix)[0] <= 0.05:
         return np.eye(3) / radius, middle, True
