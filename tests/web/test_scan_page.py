@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, CDPSession, Page, expect
 
+from tests.web.conftest import CHROMIUM, FLAGS
 from tests.web.support import PATIENCE, Server, free_port, running_server
 from tracemesh.geometry.rotations import matrix_to_quaternion
 from tracemesh_bridge.framing import Frame, FrameLayout, encode
@@ -94,6 +95,44 @@ def test_a_circle_scanned_by_phone_survives_the_death_of_the_server(phone: Page,
     assert _roundness(points) < 0.05
 
 
+def test_a_shape_is_drawn_in_the_air(server: Server, phone: Page) -> None:
+    """Two strokes: half a circle, and the other half back to where the first began; a third one is taken back."""
+    session = server.call("POST", "/sessions", {"name": "In the air"})["id"]
+    hand = Hand(phone)
+    hand.hold(0)
+    phone.goto(server.page(f"scan.html#{session}"))
+    phone.get_by_role("button", name="Use this device's sensors").click()
+    hand.lead(0, 0.01)
+    phone.get_by_role("button", name="in the air").click()
+    draw(phone, hand, 0, np.pi)
+    ends = phone.get_by_role("group", name="Node where the stroke ends")
+    ends.get_by_role("button", name="0", exact=True).click()
+    draw(phone, hand, np.pi, 2 * np.pi)
+    draw(phone, hand, 0, 0.5)
+    expect(phone.get_by_role("button", name="Undo last curve")).to_be_enabled()
+    phone.get_by_role("button", name="Undo last curve").click()
+    give_up = time.monotonic() + PATIENCE
+    while len(curves := server.call("GET", f"/sessions/{session}/curves")) > 2 and time.monotonic() < give_up:
+        time.sleep(0.1)
+    assert [[mark["node"] for mark in curve["marks"]] for curve in curves] == [[0, 1], [1, 0]]
+    assert not any(curve["boundary"] for curve in curves)
+    assert _roundness(_reconstructed(server, session)) < 0.1
+    scan = server.call("GET", f"/sessions/{session}/recordings")
+    assert [recording["device"]["wheel"] for recording in scan] == [None], "lengths come from time alone"
+
+
+def draw(phone: Page, hand: Hand, start: float, end: float) -> None:
+    """Hold the pad while the phone is led over a part of the circle."""
+    hand.hold(start)
+    pad = phone.get_by_role("button", name="Hold to draw")
+    pad.hover()
+    phone.mouse.down()
+    expect(phone.get_by_role("button", name="Drawing: let go to end")).to_be_visible()
+    hand.lead(start, end)
+    phone.mouse.up()
+    expect(pad).to_be_visible()
+
+
 SERIAL_PORT = """(frames) => {
   let controller, next = 0;
   const bytes = (hex) => Uint8Array.from(hex.match(/../g), (pair) => parseInt(pair, 16));
@@ -148,15 +187,26 @@ def test_a_refused_permission_is_told(server: Server, browser: Browser) -> None:
     context.close()
 
 
-def test_a_page_without_https_says_what_is_missing(server: Server, browser: Browser) -> None:
-    session = server.call("POST", "/sessions", {"name": "Plain"})["id"]
-    context = browser.new_context(viewport={"width": 390, "height": 780})
-    context.add_init_script("Object.defineProperty(window, 'isSecureContext', { value: false })")
-    page = context.new_page()
-    page.goto(server.page(f"scan.html#{session}"))
-    page.get_by_role("button", name="Use this device's sensors").click()
-    expect(page.get_by_role("alert")).to_contain_text("HTTPS")
-    context.close()
+def test_a_page_without_https_says_what_is_missing(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A name that is not this machine's own, over plain HTTP and with a token: what a phone on the network sees."""
+    monkeypatch.setenv("TRACEMESH_TOKEN", "a-secret-of-this-test")
+    port = free_port()
+    flags = [*FLAGS, "--host-resolver-rules=MAP lab.test 127.0.0.1"]
+    plain = browser.browser_type.launch(executable_path=CHROMIUM, args=flags)
+    with running_server(tmp_path, port) as server:
+        server.await_health()
+        page = plain.new_page(viewport={"width": 390, "height": 844})
+        page.goto(f"http://lab.test:{port}/?token=a-secret-of-this-test")
+        page.get_by_label("Name of the new session").fill("Plain")
+        page.get_by_role("button", name="New session").click()
+        expect(page.get_by_text("Nothing scanned yet.")).to_be_visible()
+        page.goto(f"http://lab.test:{port}/scan.html#{page.url.rsplit('/', 1)[1]}")
+        assert page.evaluate("window.isSecureContext") is False
+        page.get_by_role("button", name="Use this device's sensors").click()
+        expect(page.get_by_role("alert")).to_contain_text("HTTPS")
+    plain.close()
 
 
 def _reconstructed(server: Server, session: str) -> np.ndarray:

@@ -12,6 +12,13 @@ import { inWords } from "./session.svelte";
 const READINGS_INTERVAL = 500;
 const BUZZ = 40;
 
+/** Samples of which a stroke has at least this many; fewer are a tap by mistake. */
+const LEAST_STROKE = 10;
+const NO_WAKE_LOCK = "Switch the automatic screen lock off: this browser cannot keep the screen on.";
+
+/** Where a stroke begins or ends: a node, a new one (undefined), or where it began. */
+export type StrokeEnd = number | "start" | undefined;
+
 interface Mark {
   readonly node: number;
   readonly sample: number;
@@ -33,8 +40,13 @@ export class ScanStore {
   boundary = $state(true);
   closed = $state(false);
   /** The node that the next mark names; undefined: a new one. */
-  node = $state<number>();
+  node = $state<StrokeEnd>();
   nodes = $state.raw<readonly number[]>([]);
+  /** Shapes are drawn in the air, a stroke while a finger is held down, instead of led along a surface. */
+  sketching = $state(false);
+  /** Nodes at which the next stroke begins and ends. */
+  from = $state<StrokeEnd>();
+  to = $state<StrokeEnd>();
   marks = $state.raw<readonly Mark[]>([]);
   /** Readings per second, as measured. */
   rate = $state(0);
@@ -42,6 +54,8 @@ export class ScanStore {
   /** Messages that the server has not committed. */
   waiting = $state(0);
   problem = $state("");
+  /** What a person should see to, because the browser does not. */
+  advice = $state("");
   readonly #spool: DurableSpool;
   #recorder: Recorder | undefined;
   #uplink: Uplink | undefined;
@@ -113,15 +127,16 @@ export class ScanStore {
   /** Keep the screen on while sensors are read: a dark screen stops them. */
   async stayAwake(): Promise<void> {
     const { navigator, document } = this.window;
-    if (!("wakeLock" in navigator) || document.visibilityState !== "visible") return;
-    this.#wakeLock = await navigator.wakeLock.request("screen").catch(() => undefined);
+    if (document.visibilityState !== "visible") return;
+    this.#wakeLock = await navigator.wakeLock?.request("screen").catch(() => undefined);
+    this.advice = this.#wakeLock ? "" : NO_WAKE_LOCK;
   }
 
   async start(): Promise<void> {
-    if (!this.#recorder) return;
+    if (!this.#recorder || this.scanning) return;
     this.marks = [];
     this.scanning = true;
-    await this.#recorder.start(this.boundary);
+    await this.#recorder.start(!this.sketching && this.boundary);
   }
 
   async stop(): Promise<void> {
@@ -131,7 +146,7 @@ export class ScanStore {
   async mark(): Promise<void> {
     const recorder = this.#recorder;
     if (!recorder || recorder.samples === 0) return;
-    const node = this.node ?? this.newNode;
+    const node = typeof this.node === "number" ? this.node : this.newNode;
     const sample = await recorder.mark(node);
     this.marks = [...this.marks, { node, sample }];
     this.nodes = mergedNumbers(this.nodes, [node]);
@@ -145,6 +160,35 @@ export class ScanStore {
     if (!last) return this.#end(true);
     this.marks = this.marks.slice(0, -1);
     await this.#recorder?.mark(last.node, last.sample, true);
+  }
+
+  /** End a stroke: both of its ends are nodes, and the next one goes on at the second. */
+  async lift(): Promise<void> {
+    const recorder = this.#recorder;
+    if (!recorder || !this.scanning) return;
+    if (recorder.samples < LEAST_STROKE) return this.#end(true);
+    const last = recorder.samples - 1;
+    const start = typeof this.from === "number" ? this.from : this.newNode;
+    this.nodes = mergedNumbers(this.nodes, [start]);
+    const end = this.to === "start" ? start : (this.to ?? this.newNode);
+    this.nodes = mergedNumbers(this.nodes, [end]);
+    this.closed = start === end;
+    [this.from, this.to] = [end, undefined];
+    await recorder.mark(start, 0);
+    await recorder.mark(end, last);
+    await this.#end(false);
+    this.window.navigator.vibrate?.(BUZZ);
+  }
+
+  /** Take back the last curve that this recording has. */
+  async removeLast(): Promise<void> {
+    try {
+      const { recording } = this.#recorder?.state ?? {};
+      const last = (await this.api.curves(this.session)).filter((curve) => curve.recording === recording).at(-1);
+      if (last) await this.api.updateCurve(this.session, last.index, { removed: true });
+    } catch (error) {
+      this.problem = inWords(error);
+    }
   }
 
   /** The recording is finished; false while something is still on its way. */
