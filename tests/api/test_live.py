@@ -155,6 +155,18 @@ def test_health_tells_who_measures(server: Any, ride: Any) -> None:
         assert watch(socket, lambda m: m["type"] == "live.device" and m["state"] == "lost")
 
 
+def test_a_device_that_came_again_is_not_lost_with_its_old_connection(server: Any, ride: Any) -> None:
+    session = server.new_session()
+    old = ride("again", session)
+    ride("again", session)
+    with server.connect(f"/sessions/{session}/live") as socket:
+        watch(socket, is_type("live.device"))
+        assert old.receive()["code"] == "limit"
+        old.socket.close()
+        assert [m["state"] for m in watch(socket, is_type("live.device")) + watch(socket, is_type("live.device"))
+                if m["type"] == "live.device"] == ["live", "live"]  # fmt: skip
+
+
 def test_a_browser_that_does_not_read_delays_nobody(server: Any, ride: Any, line: Any) -> None:
     """Megabytes are drawn while one browser reads nothing; afterwards it gets the present state, not the backlog."""
     session = server.new_session()
