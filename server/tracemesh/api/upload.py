@@ -1,5 +1,6 @@
 """Files taken in as if a device had sent them, through the same recorder."""
 
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import IO
@@ -32,13 +33,14 @@ def file_body(*media_types: str) -> dict[str, object]:
 
 
 async def read_body(request: Request, limit: int) -> bytes:
-    """A file that is the body of a request; raises InputError when it has more than `limit` bytes."""
-    content = bytearray()
-    async for chunk in request.stream():
-        content += chunk
-        if len(content) > limit:
-            raise InputError(f"wanted a file of at most {limit} bytes")
-    return bytes(content)
+    """A file that is the body of a request; raises InputError when it has more than `limit` bytes.
+
+    As long as it is not whole it waits on disk: many slow senders cost no memory.
+    """
+    with tempfile.SpooledTemporaryFile(SPOOLED) as file:
+        await spool_body(request, limit, file)
+        file.seek(0)
+        return await run_in_threadpool(file.read)
 
 
 async def spool_body(request: Request, limit: int, file: IO[bytes]) -> None:
