@@ -114,9 +114,20 @@ def create_app(settings: Settings) -> FastAPI:
 @asynccontextmanager
 async def running(settings: Settings) -> AsyncIterator[Services]:
     """The services while the application runs."""
-    loop = asyncio.get_running_loop()
     database = Database(settings.resolved_database_url)
     await asyncio.to_thread(database.migrate)
+    services, elsewhere = _connected(settings, database)
+    tidying = asyncio.create_task(_collect_garbage(database, services.artifacts))
+    try:
+        yield services
+    finally:
+        tidying.cancel()
+        await _close(services, elsewhere)
+
+
+def _connected(settings: Settings, database: Database) -> tuple[Services, Elsewhere]:
+    """The services, each knowing whom to tell, and what listens to other servers for them."""
+    loop = asyncio.get_running_loop()
 
     def observe(state: RecordingState, message: Recorded) -> None:
         hub.accepted(state, message)
@@ -139,40 +150,22 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     metrics.watch("watchers", "Browsers that watch a session", lambda: hub.watcher_count)
     previewer, comparer = Previewer(database, recorder.flush, settings.preview_memory), Comparer()
     elsewhere = Elsewhere(database, hub)
-    exchange = Exchange(
-        database,
-        owner,
-        hear=lambda news: loop.call_soon_threadsafe(heard, news),
-        missed=lambda: loop.call_soon_threadsafe(elsewhere.missed),
+    later = loop.call_soon_threadsafe
+    exchange = Exchange(database, owner, lambda news: later(heard, news), lambda: later(elsewhere.missed))
+    runner, store, tokens = JobRunner(settings, database, tell), open_artifacts(settings), Tokens(database)
+    services = Services(
+        settings, database, store, recorder, hub, previewer, comparer, metrics, runner, exchange, loop, tokens
     )
-    runner = JobRunner(settings, database, tell)
-    store = open_artifacts(settings)
-    tidying = asyncio.create_task(_collect_garbage(database, store))
-    try:
-        yield Services(
-            settings,
-            database,
-            store,
-            recorder,
-            hub,
-            previewer,
-            comparer,
-            metrics,
-            runner,
-            exchange,
-            loop,
-            Tokens(database),
-        )
-    finally:
-        tidying.cancel()
-        await asyncio.to_thread(runner.close)
-        await hub.close()
-        await previewer.close()
-        await comparer.close()
-        await recorder.close()
-        await asyncio.to_thread(exchange.close)
-        await elsewhere.close()
-        database.close()
+    return services, elsewhere
+
+
+async def _close(services: Services, elsewhere: Elsewhere) -> None:
+    await asyncio.to_thread(services.runner.close)
+    for service in (services.hub, services.previewer, services.comparer, services.recorder):
+        await service.close()
+    await asyncio.to_thread(services.exchange.close)
+    await elsewhere.close()
+    services.database.close()
 
 
 async def _collect_garbage(database: Database, store: ArtifactStore) -> None:
