@@ -98,7 +98,7 @@ class Bridge:
         interrupted = asyncio.ensure_future(self._interrupted.wait())
         await asyncio.wait((sent, interrupted), return_when=asyncio.FIRST_COMPLETED)
         if sent.done():
-            self._failure = sent.exception()
+            self._failure = sent.exception() or self._failure
         for task in (sent, interrupted):
             task.cancel()
 
