@@ -1,13 +1,14 @@
 """Nodes are marked, moved, joined, split and deleted in the 3D view and by key; everything can be taken back."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.web.support import Server
+from tests.web.support import Rider, Server
 
 Marks = list[list[tuple[int, int]]]
 
@@ -122,6 +123,21 @@ def test_the_surface_follows_an_edit(server: Server, page: Page, session: str) -
         arg=session,
     )
     expect(view).to_have_attribute("data-surface", "shown")
+
+
+def test_a_node_is_marked_where_the_device_is(server: Server, page: Page, rider: Callable[[str], Rider]) -> None:
+    made = server.call("POST", "/sessions", {"name": "Leaf"})["id"]
+    page.goto(server.page(f"#/sessions/{made}"))
+    expect(page.get_by_text("No device is connected")).to_be_visible()
+    rider(made).ride(lambda m: m["type"] == "samples" and m["first_sample"] >= 300)
+    expect(page.get_by_role("button", name="Mark a node here")).to_be_visible()
+    known = _nodes(page).count()
+    page.keyboard.press(" ")
+    expect(_nodes(page)).to_have_count(known + 1)
+    page.keyboard.press("Numpad7")
+    expect(page.get_by_role("button", name="Edit node 7")).to_be_visible()
+    (curve,) = server.call("GET", f"/sessions/{made}/curves")
+    assert {"sample": curve["samples"] - 1, "node": 7} in curve["marks"]
 
 
 def test_a_measured_length_is_set_used_and_taken_back(server: Server, page: Page, session: str) -> None:
