@@ -4,7 +4,6 @@ Of the magnetometer against the accelerometer, and of both against the case.
 """
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from tracemesh.errors import ScanError
 from tracemesh.geometry.rotations import exp, normalized
@@ -48,6 +47,8 @@ def alignment(acceleration: Floats, magnetic: Floats) -> Floats:
 
 def _constant_angle(a: Floats, m: Floats) -> tuple[Floats, float]:
     """R (3, 3) and c that minimise the sum of (a^T R m - c)^2."""
+    from scipy.optimize import least_squares  # here: who only applies a calibration stays small without it
+
     products = (a[:, :, None] * m[:, None, :]).reshape(len(a), 9)
     loose = np.linalg.svd(np.column_stack([products, -np.ones(len(a))]), full_matrices=False)[2][-1][:9].reshape(3, 3)
     u, _, v = np.linalg.svd(loose * np.sign(np.linalg.det(loose)))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from tracemesh.errors import ScanError
 from tracemesh.geometry.scan import Floats
@@ -100,6 +99,8 @@ def _check(vectors: Floats, name: str) -> None:
 
 def _sphere_of(vectors: Floats) -> tuple[Floats, Floats, bool]:
     """Symmetric S and offset h with |S (v - h)| = 1 by least squares, and whether the vectors leave them open."""
+    from scipy.optimize import least_squares  # here: who only applies a calibration stays small without it
+
     middle, radius = _nearest_sphere(vectors)
     start = np.concatenate([np.ones(3), np.zeros(6)])
     unit = (vectors - middle) / radius
