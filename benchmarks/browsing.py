@@ -7,6 +7,7 @@ import shutil
 import time
 import urllib.request
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,16 +61,26 @@ def browsing(data: Data, minutes: float = MINUTES) -> Table:
 
 
 def _kilobytes(page: str, *later: str) -> float:
-    files = {BUILT / page, *(found for name in later for found in (BUILT / "assets").glob(name))}
-    waiting = set(files)
+    files = closure({BUILT / page, *(found for name in later for found in (BUILT / "assets").glob(name))})
+    return sum(map(compressed, files)) / 1000
+
+
+def closure(files: set[Path]) -> set[Path]:
+    """These built files and every script and style that they need at once; not scripts that are imported on demand."""
+    found, waiting = set(files), set(files)
     while waiting:
         text = waiting.pop().read_text()
         names = re.findall(r'(?:src|href)="\.?/?(assets/[^"]+)"', text)
         names += [f"assets/{name}" for name in re.findall(r'(?:from|import)\s*"\./([^"]+)"', text)]
-        fresh = {BUILT / name for name in names} - files
-        files |= fresh
+        fresh = {BUILT / name for name in names} - found
+        found |= fresh
         waiting |= fresh
-    return sum(len(gzip.compress(file.read_bytes())) for file in files) / 1000
+    return found
+
+
+def compressed(file: Path) -> int:
+    """Bytes that go over the network."""
+    return len(gzip.compress(file.read_bytes()))
 
 
 def _first_view(page: Page, address: str) -> tuple[Cell, ...]:
