@@ -21,6 +21,9 @@ from websockets.sync.client import ClientConnection, connect
 from tracemesh.api.server import configure
 from tracemesh.settings import Settings
 
+PATIENCE = 120.0
+"""s that a server process gets to start."""
+
 
 @dataclass
 class RunningServer:
@@ -136,14 +139,16 @@ class ServerProcess:
         self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL, **options)
         self._hang_up()
         client = self.client = RunningServer(self.port, pid=self.process.pid)
-        while True:
+        give_up = time.monotonic() + PATIENCE
+        while time.monotonic() < give_up:
             assert self.process.poll() is None, "the server did not start"
             try:
-                client.http.get(f"http://127.0.0.1:{self.port}/healthz")
+                client.http.get(f"http://127.0.0.1:{self.port}/healthz", timeout=5)
             except httpx.TransportError:
                 time.sleep(0.05)
             else:
                 return client
+        raise AssertionError(f"the server did not answer for {PATIENCE} s")
 
     def kill(self) -> None:
         if self.process is not None:
