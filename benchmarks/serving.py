@@ -65,7 +65,8 @@ def dask_cluster(workers: int) -> Iterator[tuple[str, int]]:
 
 
 def _dask(*arguments: str) -> subprocess.Popen[bytes]:
-    return subprocess.Popen([sys.executable, "-m", "dask", *arguments], stderr=subprocess.DEVNULL)
+    """As docs/jobs.md says of workers beside a server."""
+    return subprocess.Popen(["nice", sys.executable, "-m", "dask", *arguments], stderr=subprocess.DEVNULL)
 
 
 def free_port() -> int:
