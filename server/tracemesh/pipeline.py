@@ -300,6 +300,7 @@ def network_parameters(parameters: ReconstructionParameters) -> NetworkParameter
     return NetworkParameters(
         step=None if relative else number,
         step_fraction=number / 100 if relative else NetworkParameters.step_fraction,
+        prefilter=parameters.prefilter,
         stretch=parameters.stretch,
         bend=parameters.bend,
         weights=parameters.weights,

@@ -50,6 +50,22 @@ def test_the_mesh_is_one_oriented_disk(lilium: Path) -> None:
     assert len(loops) == 1
 
 
+def test_the_prefilter_is_as_wide_as_wanted(lilium: Path, shared_data: Path, tmp_path: Path) -> None:
+    automatic = json.loads((lilium / "report.json").read_text())["network"]["parameters"]
+    assert automatic["prefilter_m"] == automatic["step_m"] / 2
+    command = ("reconstruct", shared_data / "lilium.rawnet", "-o", tmp_path / "no.glb", "--no-surface")
+    wanted = 2 * automatic["step_m"]
+    done = tracemesh(*command, "--prefilter", wanted, "--report", tmp_path / "report.json")
+    assert done.returncode == 0, done.stderr
+    used = json.loads((tmp_path / "report.json").read_text())["network"]["parameters"]
+    assert used == automatic | {"prefilter_m": wanted} | {k: used[k] for k in ("stretch_m", "bend_m")}
+    for wrong in ("0", "-1", "nan"):
+        done = tracemesh(*command, "--prefilter", wrong)
+        assert done.returncode == 2
+        assert "prefilter" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
 def test_the_report_says_what_was_used(lilium: Path) -> None:
     report = json.loads((lilium / "report.json").read_text())
     assert report["generator"].startswith("tracemesh ")

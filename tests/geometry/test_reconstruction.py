@@ -321,12 +321,24 @@ def test_a_closed_curve_that_is_not_is_named() -> None:
         reconstruct_network(Scan((half,)))
 
 
+def test_the_automatic_prefilter_is_reported_and_given_explicitly_it_changes_nothing() -> None:
+    automatic = reconstruct_network(exact(), FIXED)
+    used = automatic.report["parameters"]["prefilter_m"]  # type: ignore[index]
+    assert used == FIXED.step / 2  # type: ignore[operator]
+    given = reconstruct_network(exact(), replace(FIXED, prefilter=used))
+    np.testing.assert_array_equal(given.network.points, automatic.network.points)
+    other = reconstruct_network(exact(), replace(FIXED, prefilter=2 * used))
+    assert not np.array_equal(other.network.points, automatic.network.points)
+
+
 def test_an_empty_scan_and_senseless_parameters_are_refused() -> None:
     with pytest.raises(ScanError, match="no curve"):
         reconstruct_network(Scan(()))
-    for wrong in ({"step": 0.0}, {"step": np.nan}, {"step_fraction": -1.0}, {"bend": -0.1}):
+    for wrong in ({"step": 0.0}, {"step": np.nan}, {"step_fraction": -1.0}, {"bend": -0.1}, {"prefilter": 0.0}):
         with pytest.raises(ScanError, match=next(iter(wrong))):
             reconstruct_network(exact(), NetworkParameters(**wrong))
+    with pytest.raises(ScanError, match=r"pre-filter of at most 25 steps, 0\.25 m, got 0\.3 m"):
+        reconstruct_network(exact(), NetworkParameters(step=0.01, prefilter=0.3))
     with pytest.raises(ScanError, match="more than 5000000 samples"):
         reconstruct_network(exact(), NetworkParameters(step=1e-9))
 

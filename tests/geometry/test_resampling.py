@@ -37,14 +37,46 @@ def test_nodes_are_rows_and_steps_are_even(name: str) -> None:
     assert layout.segment_lengths.sum() == pytest.approx(layout.lengths.sum())
 
 
+@pytest.mark.parametrize("prefilter", [0.01, 0.2])
 @pytest.mark.parametrize("spacing", ["dense", "sparse"])
-def test_quadratics_are_reproduced_from_uneven_samples(spacing: str) -> None:
+def test_quadratics_are_reproduced_from_uneven_samples(spacing: str, prefilter: float) -> None:
     random = np.random.default_rng(0)
     arc = np.sort(random.uniform(0, 1, 400 if spacing == "dense" else 30))
     places = np.linspace(arc[0], arc[-1], 60)
-    fit = fit_matrix(arc, places, 0.02)
+    fit = fit_matrix(arc, places, prefilter)
     for power in range(3):
         np.testing.assert_allclose(fit @ arc**power, places**power, atol=1e-6)
+
+
+def straight(noise: float) -> CurveScan:
+    """A metre along x whose frames do not turn, but for noise, rad."""
+    turned = exp(np.random.default_rng(0).normal(0, noise, (1001, 3)))
+    arc, ends = np.linspace(0, 1, 1001), np.array([0, 1000])
+    return CurveScan(arc, turned[:, :, 0], turned[:, :, 1], ends, np.array([0, 1]))
+
+
+def error_of(noise: float, prefilter: float | None) -> float:
+    """Root mean square error, rad, of the straight line's frames after resampling to steps of 2 cm."""
+    placed = [place_curve(clean_curve(straight(noise), 0))]
+    samples = resample(placed, uniform_layout(placed, 0.02), 0.02, prefilter)
+    return float(np.sqrt(np.mean(log(samples.frames) ** 2)))
+
+
+def test_the_automatic_prefilter_is_half_a_step() -> None:
+    placed = [place_curve(clean_curve(scan_of(np.linspace(0, 1, 1001), [0, 1000], [0, 1]), 0))]
+    layout = uniform_layout(placed, 0.02)
+    automatic, given = resample(placed, layout, 0.02), resample(placed, layout, 0.02, 0.01)
+    np.testing.assert_array_equal(automatic.frames, given.frames)
+
+
+def test_a_wider_prefilter_averages_more_noise_away() -> None:
+    errors = [error_of(0.02, prefilter) for prefilter in (0.005, 0.02, 0.08)]
+    ratios = np.divide(errors[:-1], errors[1:])
+    assert (ratios > 1.5).all(), errors  # twice, were the ends like the rest
+
+
+def test_a_straight_line_stays_exact_whatever_the_prefilter() -> None:
+    assert max(error_of(0.0, prefilter) for prefilter in (None, 0.001, 0.05, 0.5)) < 1e-12
 
 
 def test_frames_converge_in_the_third_order_of_the_step_at_least() -> None:

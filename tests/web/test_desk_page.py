@@ -136,6 +136,12 @@ def test_a_file_is_opened_edited_and_reconstructed_with_other_parameters(
     expect(page.get_by_title("Smooths over this length by resisting change of curvature")).to_contain_text(
         re.compile(r"\d (mm|cm|m)")
     )
+    prefilter = page.get_by_title("Averages measured frames over this width")
+    expect(prefilter).to_contain_text(re.compile(r"\d (mm|cm|m)"))
+    prefilter.get_by_role("checkbox").uncheck()
+    with page.expect_response(lambda r: r.url.count("/preview") and "0.0158" in (r.request.post_data or "")) as answer:
+        prefilter.get_by_role("slider").fill("0.4")
+    assert answer.value.json()["report"]["parameters"]["prefilter_m"] == 0.0158
     page.get_by_role("button", name="Back to automatic").click()
 
     page.get_by_role("button", name="Reconstruct").click()

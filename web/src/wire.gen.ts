@@ -674,6 +674,10 @@ export interface ReconstructionParameters {
    */
   mesh_size: string | null;
   /**
+   * standard deviation of the Gaussian with which scanned frames are resampled, m; none: half a step
+   */
+  prefilter: number | null;
+  /**
    * of a fixed array: number of the reading within the session; none: the last one
    */
   reading: number | null;
@@ -879,6 +883,10 @@ export interface PreviewWish {
    * distance of the surface's vertices: % of the network's diagonal, or m; none: as its points
    */
   mesh_size: string | null;
+  /**
+   * standard deviation of the Gaussian with which scanned frames are resampled, m; none: half a step
+   */
+  prefilter: number | null;
   /**
    * of a fixed array: number of the reading within the session; none: the last one
    */

@@ -60,6 +60,9 @@ def add_reconstruct(commands: Commands) -> None:
 
 def _add_smoothing(parser: argparse.ArgumentParser) -> None:
     """How noise and errors of whole curves are dealt with."""
+    parser.add_argument(
+        "--prefilter", type=float, metavar="SIGMA", help="width of the Gaussian while resampling, m (auto: half a step)"
+    )
     parser.add_argument("--stretch", type=float, metavar="L2", help="smoothing length of the stretch term, m (auto)")
     parser.add_argument("--bend", type=float, metavar="L4", help="smoothing length of the bend term, m (auto)")
     parser.add_argument("--weights", choices=("auto", "thesis"), default="auto", help="smoothing (default auto)")
@@ -129,6 +132,7 @@ def _reconstruct(chosen: argparse.Namespace) -> int:
     parameters = ReconstructionParameters(
         step=chosen.step,
         mesh_size=chosen.mesh_size,
+        prefilter=chosen.prefilter,
         stretch=chosen.stretch,
         bend=chosen.bend,
         weights=chosen.weights,

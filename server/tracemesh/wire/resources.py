@@ -204,6 +204,11 @@ class ReconstructionParameters(Message):
         pattern=PERCENT_OR_METRES,
         description="distance of the surface's vertices: % of the network's diagonal, or m; none: as its points",
     )
+    prefilter: float | None = Field(
+        default=None,
+        gt=0,
+        description="standard deviation of the Gaussian with which scanned frames are resampled, m; none: half a step",
+    )
     stretch: float | None = Field(default=None, ge=0, description="smoothing length of the stretch term, m")
     bend: float | None = Field(default=None, ge=0, description="smoothing length of the bend term, m")
     weights: Literal["auto", "thesis"] = "auto"

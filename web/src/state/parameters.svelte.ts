@@ -12,6 +12,8 @@ export class ParametersStore {
   /** % of the estimated diagonal. */
   step = $state(DEFAULT_STEP);
   /** m; undefined: automatic. */
+  prefilter = $state<number>();
+  /** m; undefined: automatic. */
   stretch = $state<number>();
   /** m; undefined: automatic. */
   bend = $state<number>();
@@ -22,6 +24,7 @@ export class ParametersStore {
   get request(): Partial<ReconstructionParameters> {
     return {
       step: `${Number(this.step.toPrecision(3))}%`,
+      ...(this.prefilter === undefined ? {} : { prefilter: this.prefilter }),
       ...(this.stretch === undefined ? {} : { stretch: this.stretch }),
       ...(this.bend === undefined ? {} : { bend: this.bend }),
       weights: this.weights,
@@ -31,14 +34,14 @@ export class ParametersStore {
   }
 
   get isDefault(): boolean {
-    const { step, stretch, bend, weights, curveBias, soft } = this;
-    const lengths = stretch === undefined && bend === undefined;
+    const { step, prefilter, stretch, bend, weights, curveBias, soft } = this;
+    const lengths = prefilter === undefined && stretch === undefined && bend === undefined;
     return step === DEFAULT_STEP && lengths && weights === "auto" && curveBias === "auto" && !soft;
   }
 
   reset(): void {
     this.step = DEFAULT_STEP;
-    this.stretch = this.bend = undefined;
+    this.prefilter = this.stretch = this.bend = undefined;
     this.weights = this.curveBias = "auto";
     this.soft = false;
   }

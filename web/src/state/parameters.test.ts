@@ -5,8 +5,9 @@ it("leaves out of the request what is automatic", () => {
   const parameters = new ParametersStore();
   expect(parameters.request).toEqual({ step: "1.6%", weights: "auto", curve_bias: "auto", soft: false });
   parameters.bend = 0.05;
+  parameters.prefilter = 0.004;
   parameters.step = 2.345678;
-  expect(parameters.request).toMatchObject({ step: "2.35%", bend: 0.05 });
+  expect(parameters.request).toMatchObject({ step: "2.35%", bend: 0.05, prefilter: 0.004 });
   expect(parameters.isDefault).toBe(false);
   parameters.reset();
   expect(parameters.isDefault).toBe(true);

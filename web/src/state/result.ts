@@ -103,8 +103,8 @@ export function warningsOf(report: Report): string[] {
   return lists.flatMap((list) => (Array.isArray(list) ? list.map(String) : []));
 }
 
-/** A smoothing length that was chosen automatically, m. */
-export function chosenLength(report: Report | undefined, name: "stretch_m" | "bend_m"): number | undefined {
+/** A length that was chosen automatically, m. */
+export function chosenLength(report: Report | undefined, name: "prefilter_m" | "stretch_m" | "bend_m"): number | undefined {
   const parameters = report?.network?.["parameters"];
   const value = parameters && typeof parameters === "object" ? (parameters as Record<string, unknown>)[name] : undefined;
   return typeof value === "number" ? value : undefined;

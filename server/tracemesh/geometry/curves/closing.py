@@ -117,15 +117,23 @@ def _next(found: Closing, curves: Sequence[PlacedCurve], layout: Layout, choice:
 
 
 def close_network(
-    curves: Sequence[PlacedCurve], samples: NetworkSamples, choice: Choice, step: float, mode: Mode
+    curves: Sequence[PlacedCurve],
+    samples: NetworkSamples,
+    choice: Choice,
+    step: float,
+    prefilter: float,
+    mode: Mode,
 ) -> Closed:
-    """Find errors of whole curves and take them back; large rotations, for which the equations are rough, in rounds."""
+    """Find errors of whole curves and take them back; large rotations, for which the equations are rough, in rounds.
+
+    step, prefilter: those of the samples, m.
+    """
     found = closing = _first(curves, samples.layout, choice, step, mode)
     start = choice.frames
     for left in reversed(range(_ROUNDS if closing.variances.with_bias else 0)):
         curves = correct_curves(curves, closing.corrections)
         start = exp(closing.corrections.rotation)[samples.layout.curve] @ choice.frames
-        samples = resample(curves, moved_layout(samples.layout, curves), step)
+        samples = resample(curves, moved_layout(samples.layout, curves), step, prefilter)
         if not left or np.abs(closing.corrections.rotation).max() < _SMALL:
             break
         choice = replace(choice, frames=smooth_frames(curves, samples, choice.weights))

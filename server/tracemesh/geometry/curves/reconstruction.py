@@ -19,7 +19,7 @@ from tracemesh.geometry.curves.polyline import MeasuredNetwork, measure_network,
 from tracemesh.geometry.curves.positions import Positions, check_connected, solve_positions
 from tracemesh.geometry.curves.quadrature import edge_vectors
 from tracemesh.geometry.curves.regression import Regression, RegressionSolver
-from tracemesh.geometry.curves.resampling import resample
+from tracemesh.geometry.curves.resampling import PREFILTER, resample
 from tracemesh.geometry.curves.samples import Layout, NetworkSamples
 from tracemesh.geometry.curves.sketch import with_lengths
 from tracemesh.geometry.curves.uncertainty import point_uncertainty
@@ -34,6 +34,7 @@ Progress = Callable[[str, float], None]
 _STAGES = ("cleaning", "measuring", "resampling", "weighing", "closing", "smoothing", "positions", "uncertainty")
 _FLATTEST = 1e-3  # diagonal over length of the curves that a step is still derived from
 _MOST_SAMPLES = 5_000_000
+_WIDEST = 25.0  # steps that a pre-filter may be wide: each sample sees a bounded number of measured ones
 _OPEN_GAP = 0.2  # of its length that a closed curve may lack as measured; a half circle lacks 0.64
 
 
@@ -43,11 +44,13 @@ class NetworkParameters:
     lengths, m; None: automatic, or 0 if only the other is given. weights: automatic ones by cross-validation, or the
     thesis's lambda = mu = 1 in metres. curve_bias: estimate a rotation and a scale per curve and how far its nodes are
     from their marks: where the data speak for it, always, or never.
+    prefilter: standard deviation, m, of the Gaussian with which frames are resampled; None: half a step.
     robust: Huber's loss in the regression, for scans with more outliers than cleaning can tell from the rest.
     """
 
     step: float | None = None
     step_fraction: float = 0.016
+    prefilter: float | None = None
     stretch: float | None = None
     bend: float | None = None
     weights: Literal["auto", "thesis"] = "auto"
@@ -110,8 +113,9 @@ class NetworkReconstruction:
         self._measured = measure_network(curves, measured_layout(curves))
         _check_closed(curves, self._measured)
         self._step = _step(self._parameters, curves, self._measured)
+        self._prefilter = _prefilter(self._parameters, self._step)
         self._stages.begin("resampling")
-        samples = resample(curves, uniform_layout(curves, self._step), self._step)
+        samples = resample(curves, uniform_layout(curves, self._step), self._step, self._prefilter)
         self._stages.begin("weighing")
         self._choice = choose_weights(curves, samples, self._step)
         self._stages.begin("closing")
@@ -125,7 +129,7 @@ class NetworkReconstruction:
         """The network freed from errors of whole curves; None for a polyline, which is exact as it is."""
         if self._measured.is_polyline:
             return None
-        return close_network(curves, samples, self._choice, self._step, self._parameters.curve_bias)
+        return close_network(curves, samples, self._choice, self._step, self._prefilter, self._parameters.curve_bias)
 
     def solve(self, weights: Weights | None = None) -> NetworkResult:
         """The network, smoothed with the chosen weights or with others; the latter starts from the solution before."""
@@ -173,6 +177,7 @@ class NetworkReconstruction:
         return {
             "parameters": {
                 "step_m": self._step,
+                "prefilter_m": self._prefilter,
                 "stretch_m": weights.stretch,
                 "bend_m": weights.bend,
                 "robust": self._parameters.robust,
@@ -206,7 +211,7 @@ def _cleaned(scan: Scan) -> tuple[CleanCurve, ...]:
 
 
 def _check_parameters(parameters: NetworkParameters) -> None:
-    for name in ("step", "step_fraction", "stretch", "bend"):
+    for name in ("step", "step_fraction", "prefilter", "stretch", "bend"):
         value = getattr(parameters, name)
         least_is_zero = name in ("stretch", "bend")
         if value is not None and not (np.isfinite(value) and (value > 0 or (value == 0 and least_is_zero))):
@@ -226,6 +231,13 @@ def _step(parameters: NetworkParameters, curves: Sequence[PlacedCurve], measured
             f"a step of {step:.3g} m would cut the curves, {length:.3g} m long, into more than {_MOST_SAMPLES} samples"
         )
     return step
+
+
+def _prefilter(parameters: NetworkParameters, step: float) -> float:
+    wanted = parameters.prefilter
+    if wanted is not None and wanted > _WIDEST * step:
+        raise ScanError(f"wanted a pre-filter of at most {_WIDEST:g} steps, {_WIDEST * step:.3g} m, got {wanted:.3g} m")
+    return PREFILTER * step if wanted is None else wanted
 
 
 def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> None:

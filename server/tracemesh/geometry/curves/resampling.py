@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-_WIDTH = 0.5  # standard deviation of the Gaussian, in steps
+PREFILTER = 0.5  # standard deviation of the Gaussian that is chosen automatically, in steps
 _REACH = 3.0  # standard deviations after which it is cut
 _NEAREST = 2  # measured samples on each side that a fit sees, however sparse they are
 _RIDGE = 1e-9  # keeps a fit to few samples solvable; relative to the sum of weights
@@ -43,13 +43,16 @@ def _extended(curve: PlacedCurve, margin: float, used: Bools | None) -> tuple[Fl
     return around, np.concatenate([flip * quaternion[before:], quaternion, flip * quaternion[:after]])
 
 
-def _windows(arc: Floats, places: Floats, step: float) -> tuple[Ints, Ints, Floats]:
-    """First and last + 1 measured sample that each place (k,) sees, and the width (k,) of its Gaussian, m."""
+def _windows(arc: Floats, places: Floats, prefilter: float) -> tuple[Ints, Ints, Floats]:
+    """First and last + 1 measured sample that each place (k,) sees, and the width (k,) of its Gaussian, m.
+
+    That is the pre-filter's, or as much as takes in the nearest samples.
+    """
     after = np.searchsorted(arc, places)
     low = np.maximum(after - _NEAREST, 0)
     high = np.minimum(after + _NEAREST, len(arc))
     spread = np.maximum(places - arc[low], arc[high - 1] - places)
-    width = np.maximum(_WIDTH * step, spread / 2)
+    width = np.maximum(prefilter, spread / 2)
     low = np.minimum(low, np.searchsorted(arc, places - _REACH * width))
     high = np.maximum(high, np.searchsorted(arc, places + _REACH * width, side="right"))
     return low, high, width
@@ -74,9 +77,12 @@ def _fit_weights(offset: Floats, row: Ints, rows: int) -> Floats:
     return result
 
 
-def fit_matrix(arc: Floats, places: Floats, step: float) -> csr_array:
-    """Linear map (k, n) from values measured at increasing arcs (n,) to fitted values at increasing places (k,), m."""
-    low, high, width = _windows(arc, places, step)
+def fit_matrix(arc: Floats, places: Floats, prefilter: float) -> csr_array:
+    """Linear map (k, n) from values measured at increasing arcs (n,) to fitted values at increasing places (k,), m.
+
+    prefilter: standard deviation of the Gaussian, m.
+    """
+    low, high, width = _windows(arc, places, prefilter)
     counts = high - low
     indptr = np.concatenate([[0], np.cumsum(counts)])
     row = np.repeat(np.arange(len(places)), counts)
@@ -85,17 +91,23 @@ def fit_matrix(arc: Floats, places: Floats, step: float) -> csr_array:
     return csr_array((weights, column, indptr), shape=(len(places), len(arc)))
 
 
-def resample_curve(curve: PlacedCurve, places: Floats, step: float, used: Bools | None = None) -> Floats:
+def resample_curve(curve: PlacedCurve, places: Floats, prefilter: float, used: Bools | None = None) -> Floats:
     """Unit quaternions (k, 4) at increasing arcs (k,), m, on a curve; used: (n,) which measured samples to fit."""
-    arc, quaternion = _extended(curve, _REACH * _WIDTH * step, used)
-    fitted: Floats = normalized(fit_matrix(arc, places, step) @ quaternion)
+    arc, quaternion = _extended(curve, _REACH * prefilter, used)
+    fitted: Floats = normalized(fit_matrix(arc, places, prefilter) @ quaternion)
     if curve.closed and places[-1] == curve.length:
         fitted[-1] = fitted[0]
     return fitted
 
 
-def resample(curves: Sequence[PlacedCurve], layout: Layout, step: float) -> NetworkSamples:
-    """Frames of curves at the rows of a layout with the given step, m."""
+def resample(
+    curves: Sequence[PlacedCurve], layout: Layout, step: float, prefilter: float | None = None
+) -> NetworkSamples:
+    """Frames of curves at the rows of a layout with the given step, m.
+
+    prefilter: standard deviation of the Gaussian, m; None: PREFILTER steps.
+    """
+    width = PREFILTER * step if prefilter is None else prefilter
     rows = [slice(*layout.first[i : i + 2]) for i in range(len(curves))]
-    fitted = [resample_curve(c, layout.arc[r], step) for c, r in zip(curves, rows, strict=True)]
+    fitted = [resample_curve(c, layout.arc[r], width) for c, r in zip(curves, rows, strict=True)]
     return NetworkSamples(layout, quaternion_to_matrix(np.concatenate(fitted)))
