@@ -58,6 +58,16 @@ def test_curves_grow_while_they_are_scanned(server: Any, ride: Any, line: Any) -
         assert [n["node"] for n in nodes] == [0, 1]
 
 
+def test_everybody_hears_how_many_watch(server: Any) -> None:
+    path = f"/sessions/{server.new_session()}/live"
+    with server.connect(path) as first:
+        assert watch(first, is_type("live.snapshot"))[-1]["watchers"] == 1
+        with server.connect(path) as second:
+            assert watch(second, is_type("live.snapshot"))[-1]["watchers"] == 2
+            assert watch(first, is_type("live.watchers"))[-1]["count"] == 2
+        assert watch(first, is_type("live.watchers"))[-1]["count"] == 1
+
+
 def test_a_late_joiner_sees_what_an_early_one_sees(server: Any, ride: Any, line: Any) -> None:
     session = server.new_session()
     rider = ride("late", session)

@@ -80,6 +80,19 @@ def test_a_late_joiner_sees_everything_and_looks_closer(
     assert download.value.suggested_filename == "Leaf, again.png"
 
 
+def test_everybody_sees_how_many_watch(server: Server, page: Page) -> None:
+    address = server.page(f"#/sessions/{server.call('POST', '/sessions', {})['id']}")
+    page.goto(address)
+    expect(page.get_by_text("Nothing scanned yet.")).to_be_visible()
+    expect(page.get_by_text("watching")).to_have_count(0)
+    other = page.context.new_page()
+    other.goto(address)
+    for each in (page, other):
+        expect(each.get_by_text("2 watching")).to_be_visible()
+    other.close()
+    expect(page.get_by_text("watching")).to_have_count(0)
+
+
 def test_sessions_are_renamed_and_deleted_with_undo(server: Server, page: Page) -> None:
     for name in ("Vase", "Bowl"):
         server.call("POST", "/sessions", {"name": name})

@@ -704,6 +704,15 @@ export interface ReconstructionParameters {
   weights: "auto" | "thesis";
 }
 /**
+ * Somebody joined or left: how many sockets watch the session on this server, the receiver's own included.
+ *
+ * Those that watch the same session through another server are not counted.
+ */
+export interface LiveWatchers {
+  count: number;
+  type: "live.watchers";
+}
+/**
  * A node of the latest network of a session.
  */
 export interface NetworkNode {
@@ -1107,6 +1116,10 @@ export interface Snapshot {
   reconstruction: Reconstruction | null;
   session: string;
   type: "live.snapshot";
+  /**
+   * as in live.watchers
+   */
+  watchers: number;
 }
 /**
  * A token, without its secret.

@@ -65,6 +65,17 @@ class Snapshot(Message):
     devices: list[LiveDevice] = Field(default=[])
     readings: list[LiveReading] = Field(default=[], description="the newest one of every array that has one")
     reconstruction: Reconstruction | None = None
+    watchers: Count = Field(default=0, description="as in live.watchers")
+
+
+class LiveWatchers(Message):
+    """Somebody joined or left: how many sockets watch the session on this server, the receiver's own included.
+
+    Those that watch the same session through another server are not counted.
+    """
+
+    type: Literal["live.watchers"] = "live.watchers"
+    count: Count
 
 
 class LiveCurveStart(Message):
@@ -125,7 +136,15 @@ class LiveReconstruction(Message):
 
 
 Change = (
-    LiveCurveStart | LivePoints | LiveNode | LiveCurveEnd | LiveNetwork | LiveReading | LiveDevice | LiveReconstruction
+    LiveCurveStart
+    | LivePoints
+    | LiveNode
+    | LiveCurveEnd
+    | LiveNetwork
+    | LiveReading
+    | LiveDevice
+    | LiveWatchers
+    | LiveReconstruction
 )
 ToBrowser = Annotated[Snapshot | Change, Field(discriminator="type")]
 to_browser: TypeAdapter[Snapshot | Change] = TypeAdapter(ToBrowser)

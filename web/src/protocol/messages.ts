@@ -7,6 +7,7 @@ import type {
   LivePoints,
   LiveReading,
   LiveReconstruction,
+  LiveWatchers,
   Snapshot,
 } from "../wire.gen";
 
@@ -20,6 +21,7 @@ export type ToBrowser =
   | LiveNetwork
   | LiveReading
   | LiveDevice
+  | LiveWatchers
   | LiveReconstruction;
 
 const known: ReadonlySet<string> = new Set<ToBrowser["type"]>([
@@ -31,6 +33,7 @@ const known: ReadonlySet<string> = new Set<ToBrowser["type"]>([
   "live.network",
   "live.reading",
   "live.device",
+  "live.watchers",
   "live.reconstruction",
 ]);
 

@@ -8,6 +8,7 @@ import type {
   CurveUpdate,
   LiveDevice,
   LiveReading,
+  LiveWatchers,
   NetworkProblem,
   Reconstruction,
   ReconstructionParameters,
@@ -21,6 +22,7 @@ import { Network } from "./network";
 import { Latest } from "./latest";
 import { newName } from "./names";
 import { ParametersStore } from "./parameters.svelte";
+import { PresenceStore } from "./presence.svelte";
 import { loadResult, type Report, type Result } from "./result";
 import { RightsStore } from "./rights.svelte";
 
@@ -55,9 +57,10 @@ export class SessionStore {
   readonly live = new Network();
   readonly history = new History();
   readonly parameters = new ParametersStore();
+  readonly presence = new PresenceStore();
   readonly array = new ArrayStore({
     fetch: (number) => this.api.reading(this.id, number),
-    isLive: (recording) => this.devices.some((device) => device.recording === recording && device.state === "live"),
+    isLive: (recording) => this.presence.isLive(recording),
     changed: (outdates) => {
       if (outdates) this.#outdate();
       this.#redraw();
@@ -66,7 +69,6 @@ export class SessionStore {
   });
   session = $state<Session>();
   connection = $state<Connection>("connecting");
-  devices = $state.raw<readonly LiveDevice[]>([]);
   curves = $state.raw<readonly CurveEntry[]>([]);
   nodes = $state.raw<readonly number[]>([]);
   /** Whether the server told what there is. */
@@ -145,8 +147,9 @@ export class SessionStore {
   receive(message: ToBrowser): void {
     switch (message.type) {
       case "live.device":
-        this.#heard([message]);
-        break;
+        return this.presence.hear(message);
+      case "live.watchers":
+        return void (this.presence.watchers = message.count);
       case "live.reconstruction":
         this.#progressed(message.reconstruction);
         break;
@@ -222,14 +225,15 @@ export class SessionStore {
     return this.ofArray && shown ? { ...request, reading: shown.number } : request;
   }
 
-  #fold(message: Exclude<ToBrowser, LiveDevice | LiveReading | { type: "live.reconstruction" }>): void {
+  #fold(message: Exclude<ToBrowser, LiveDevice | LiveReading | LiveWatchers | { type: "live.reconstruction" }>): void {
     const change = this.live.apply(message);
     if (change === "gap") return this.#socket?.restart();
     if (message.type === "live.snapshot" || message.type === "live.curve.start") void this.#listRecordings();
     if (message.type !== "live.points") this.#detailsSoon();
     if (message.type === "live.snapshot") {
       this.known = true;
-      this.#heard(message.devices);
+      this.presence.hear(...message.devices);
+      this.presence.watchers = message.watchers;
       for (const reading of message.readings) this.array.hear(reading);
       if (message.reconstruction) this.#progressed(message.reconstruction);
     }
@@ -237,11 +241,6 @@ export class SessionStore {
     if (change === "replaced") this.replacements += 1;
     this.revision += 1;
     this.#listSoon();
-  }
-
-  #heard(devices: readonly LiveDevice[]): void {
-    const others = this.devices.filter((old) => !devices.some((device) => device.recording === old.recording));
-    this.devices = [...others, ...devices].sort((a, b) => a.recording.localeCompare(b.recording));
   }
 
   #progressed(reconstruction: Reconstruction): void {

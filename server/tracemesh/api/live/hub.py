@@ -128,12 +128,12 @@ class Hub:
         if session not in self._rooms or self._rooms[session].stopped:
             self._rooms[session] = Room(session, self._meters[session], self._load, self._solve, self._draw)
         room, client = self._rooms[session], Client()
-        room.clients.add(client)
+        room.enter(client)
         return room, client
 
     async def leave(self, room: Room, client: Client) -> None:
         """Somebody watches no more; the last one puts out the light."""
-        room.clients.discard(client)
+        room.leave(client)
         if not room.clients and self._rooms.get(room.session) is room:
             del self._rooms[room.session]
             self._forget_lost(room.session)

@@ -17,7 +17,7 @@ from tracemesh.jobs.attached import SolvedNetwork
 from tracemesh.jobs.readings import SolvedReading
 from tracemesh.storage.readings import StoredReading
 from tracemesh.wire.device import CurveEnd, NodeMark
-from tracemesh.wire.live import LiveReading, LiveReconstruction, Snapshot
+from tracemesh.wire.live import LiveReading, LiveReconstruction, LiveWatchers, Snapshot
 from tracemesh.wire.resources import Reconstruction
 
 FRAME = 1 / 60
@@ -79,6 +79,19 @@ class Room:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
+    def enter(self, client: Client) -> None:
+        """Somebody watches."""
+        self.clients.add(client)
+        self._tell_watchers()
+
+    def leave(self, client: Client) -> None:
+        """Somebody watches no more."""
+        self.clients.discard(client)
+        self._tell_watchers()
+
+    def _tell_watchers(self) -> None:
+        self._broadcast(LiveWatchers(count=len(self.clients)), replaces="watchers")
+
     def take(self, accepted: Accepted) -> None:
         """A message was accepted; drawn at the next frame."""
         self._pending.append(accepted)
@@ -124,6 +137,7 @@ class Room:
             devices=[meter.read() for meter in self._meters.values()],
             readings=list(self._drawn.values()),
             reconstruction=self._reconstruction,
+            watchers=len(self.clients),
         ).model_dump_json()
 
     def _broadcast(self, message: BaseModel, replaces: str = "") -> None:
