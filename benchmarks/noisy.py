@@ -69,11 +69,15 @@ def normalised_errors(known: KnownScan) -> Floats:
 
 def partners(network: CurveNetwork, truth: CurveNetwork) -> Floats:
     """Where points (n, 3) that are evenly spaced along each segment of a network lie on the truth's segments."""
+    return at_partners(network, truth, truth.points)
+
+
+def at_partners(network: CurveNetwork, truth: CurveNetwork, values: Floats) -> Floats:
+    """Values (m, 3) at the truth's points as values (n, 3) at the `partners` of a network's points."""
     result = np.empty_like(network.points)
     for found, known in zip(network.segments, truth.segments, strict=True):
-        points = truth.points[known.points]
-        shares = np.linspace(0, 1, len(found.points))
-        result[found.points] = np.stack([np.interp(shares, _shares(points), axis) for axis in points.T], axis=1)
+        here, share = np.linspace(0, 1, len(found.points)), _shares(truth.points[known.points])
+        result[found.points] = np.stack([np.interp(here, share, axis) for axis in values[known.points].T], axis=1)
     return result
 
 

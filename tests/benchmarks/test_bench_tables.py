@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import accuracy, arrays, growth, lengths, meshes, nodes, noisy, regression, surfacing, times
-from benchmarks.data import Data
+from benchmarks import accuracy, arrays, crossings, growth, lengths, meshes, nodes, noisy, regression, surfacing, times
+from benchmarks.data import Data, noisy_scan
 from benchmarks.report import read_report, record, write_report
 from benchmarks.table import Column, Table
 from benchmarks.thesis_energy import ThesisEnergy
 from tracemesh.geometry.curves.energy import EnergyPoint
 from tracemesh.geometry.curves.stencil import Stencil
+from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.scan import Scan
 from tracemesh.geometry.simulated.shapes import leaf
 from tracemesh.geometry.simulated.simulation import exact_scan
@@ -101,6 +102,27 @@ def test_given_lengths_are_those_between_nodes() -> None:
     wrong = Scan(tuple(replace(c, distance=c.distance**2 + 5) for c in scan.curves))
     for known, curve in zip(shape.curves, lengths.with_lengths(wrong, shape.curves).curves, strict=True):
         assert curve.distance[curve.node_samples] == pytest.approx(known.node_positions)
+
+
+def test_bends_through_nodes_make_normals_smoother_there() -> None:
+    table = crossings.crossings(WITHOUT, ("cone",), 1)
+    end, through = (numbers(table, column)[0] for column in (1, 2))
+    assert through < 1.5 < end
+    asymmetry, *errors = table.rows[0][3:]
+    assert float(str(asymmetry)) > 0.01
+    assert all(0 < float(str(error)) < 1 for error in errors)
+
+
+def test_symmetric_shape_operators_are_reached_and_their_derivative_is_right() -> None:
+    problem = crossings.Problem.of(noisy_scan("leaf"))
+    stencil = Stencil(problem.samples.layout)
+    data, operator = problem.samples.frames[stencil.representative], crossings.ShapeOperator(stencil)
+    x = crossings.minimised(stencil, data, problem.weights, problem.start[stencil.representative])
+    found = crossings.symmetric(stencil, data, problem.weights, x)
+    assert np.abs(operator.defect(found)).max() < 1e-6 * np.abs(operator.defect(x)).max()
+    w = np.random.default_rng(1).standard_normal((len(x), 3))
+    ahead, behind = (operator.defect(x @ exp(e * w)) for e in (1e-6, -1e-6))
+    np.testing.assert_allclose(operator.derivative(x) @ w.ravel(), (ahead - behind) / 2e-6, atol=1e-6)
 
 
 def test_nodes() -> None:

@@ -1,5 +1,7 @@
 """Regression on SO(3): derivatives, scipy's minimiser as oracle, nodes, warm starts, independence of the step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -12,6 +14,7 @@ from tracemesh.geometry.curves.resampling import resample
 from tracemesh.geometry.curves.samples import NetworkSamples
 from tracemesh.geometry.curves.stencil import Stencil
 from tracemesh.geometry.rotations import exp, log
+from tracemesh.geometry.scan import CurveScan, Scan
 from tracemesh.geometry.simulated.shapes import SHAPES
 from tracemesh.geometry.simulated.simulation import exact_scan
 
@@ -185,3 +188,91 @@ def test_robust_solution_is_a_minimum_of_hubers_loss() -> None:
     for size in (1e-2, 1e-3):
         for _ in range(10):
             assert loss(x @ exp(size * random.standard_normal((len(x), 3)))) > loss(x)
+
+
+def great_circles(kink: float = 0.0, place: float = np.pi, parts: int = 24) -> tuple[Stencil, np.ndarray]:
+    """Stencil and frames of three great circles, cut into `parts` edges between the nodes where they meet.
+
+    kink: rad/m by which the first one turns faster for a quarter from `place` on, m, and slower for the next quarter.
+    """
+    scans, frames, marks = [], [], parts * np.arange(5)
+    nodes = np.array([[0, 1, 3, 4, 0], [1, 2, 4, 5, 1], [2, 0, 5, 3, 2]])
+    arc, axes = np.linspace(0, 2 * np.pi, 4 * parts + 1), np.eye(3)
+    for k, ids in enumerate(nodes):
+        u, v = axes[k], axes[(k + 1) % 3]
+        normal = np.outer(np.cos(arc), u) + np.outer(np.sin(arc), v)
+        tangent = np.outer(-np.sin(arc), u) + np.outer(np.cos(arc), v)
+        scans.append(CurveScan(arc, tangent, normal, marks, ids, False, True))
+        frames.append(np.stack([tangent, normal, np.cross(tangent, normal)], axis=2))
+    curves = [place_curve(c) for c in clean_curves(scans)]
+    layout = uniform_layout(curves, np.pi / 2 / parts)
+    assert layout.size == 3 * len(arc)
+    after = (arc - place) % (2 * np.pi)
+    frames[0] = frames[0] @ exp(np.outer(kink * np.clip(np.minimum(after, np.pi - after), 0, None), axes[2]))
+    stencil = Stencil(layout)
+    return stencil, np.concatenate(frames)[stencil.representative]
+
+
+def test_bends_go_through_every_node_that_a_curve_passes() -> None:
+    """Also where a closed curve begins and ends; only the ends of open curves have none."""
+    layout = noisy_samples("leaf", 0.05).layout
+    stencil = Stencil(layout)
+    is_open = np.flatnonzero(~layout.closed)
+    ends = stencil.row[np.concatenate([layout.first[is_open], layout.first[is_open + 1] - 1])]
+    passed = np.setdiff1d(stencil.row[layout.marks], ends)
+    assert layout.closed.any()
+    assert len(passed) > 10
+    np.testing.assert_array_equal(stencil.centre, np.setdiff1d(np.arange(stencil.size), ends))
+    at_node = np.isin(stencil.centre, passed)
+    curve = layout.curve[stencil.representative]
+    for side in (stencil.before, stencil.after):
+        assert (side[at_node] != stencil.centre[at_node]).all()
+        np.testing.assert_array_equal(curve[side[at_node]], curve[stencil.centre[at_node]])
+
+
+def test_great_circles_through_nodes_have_no_energy() -> None:
+    stencil, x = great_circles()
+    assert len(stencil.pair) == 6
+    assert EnergyPoint(stencil, x, x, Weights(0.0, 1.0)).value < 1e-12
+
+
+@pytest.mark.parametrize("kink", [0.3, -0.05])
+@pytest.mark.parametrize("shift", [0, 5])
+def test_a_kink_at_a_node_costs_what_it_costs_elsewhere(kink: float, shift: int) -> None:
+    """Two kinks and one of twice the size: at three nodes, or five edges behind them."""
+    h = np.pi / 48
+    stencil, x = great_circles(kink, np.pi + shift * h)
+    stencil.stiffness = 0.0  # the kinks move the first circle's normals away from the others'
+    rates = np.sin(np.array([1, 1 + kink, 1 - kink, 1]) * h) / h
+    expected = 0.1**4 * 2 * np.sum(np.diff(rates) ** 2) / h
+    assert EnergyPoint(stencil, x, x, Weights(0.0, 0.1)).value == pytest.approx(expected, rel=1e-9)
+
+
+def test_normals_of_noisy_curves_bend_as_smoothly_at_nodes_as_between_them() -> None:
+    """Half the step, half the jump of the normal's derivative at nodes: it is differentiable along curves there."""
+    jumps = []
+    curves = [place_curve(c) for c in clean_curves(shaken_leaf().curves)]
+    for step in (0.01, 0.005):
+        samples = resample(curves, uniform_layout(curves, step), step)
+        found, s = RegressionSolver(samples.layout).solve(samples.frames, Weights(0.0, 0.1)), Stencil(samples.layout)
+        n = found.frames[s.representative, :, 1]
+        jump = (n[s.after] - n[s.centre]) / s.h_out[:, None] - (n[s.centre] - n[s.before]) / s.h_in[:, None]
+        length = np.linalg.norm(jump, axis=1)
+        at_node = np.isin(s.centre, s.row[samples.layout.marks])
+        assert rms(length[at_node]) < 1.5 * rms(length[~at_node])
+        jumps.append(rms(length[at_node]))
+    assert jumps[0] / jumps[1] == pytest.approx(2, rel=0.1)
+
+
+def shaken_leaf() -> Scan:
+    """A scan of the leaf, its frames turned by 3 degrees rms about every axis."""
+    random, curves = np.random.default_rng(3), []
+    for curve in exact_scan(SHAPES["leaf"](), 0.0025).curves:
+        turn = exp(0.05 * random.standard_normal((len(curve.distance), 3)))
+        tangent, normal = ((turn @ v[:, :, None])[:, :, 0] for v in (curve.tangent, curve.normal))
+        curves.append(replace(curve, tangent=tangent, normal=normal))
+    return Scan(tuple(curves))
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
