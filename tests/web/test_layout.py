@@ -48,11 +48,21 @@ def test_nothing_covers_anything(
     expect(page.get_by_role("heading", name="Curvature along curve")).to_be_visible()
     expect(page.get_by_role("slider", name="Place on curve 1")).to_be_visible()
     _check(page, width)
-    page.keyboard.press("0")
+    for key in ("p", "0"):
+        page.keyboard.press(key)
     page.wait_for_timeout(300)
+    _check_gauss_map(page)
     boundary, background = share_of_pixels(view, "curve-boundary", "view")
     assert boundary > 0.0005
     assert background < 0.995
+
+
+def _check_gauss_map(page: Page) -> None:
+    """It covers nothing of the object, seen whole: behind it there is only the background."""
+    page.get_by_label("Grid").uncheck()
+    figure = page.locator("main > figure")
+    figure.evaluate("figure => (figure.style.opacity = 0)")
+    assert share_of_pixels(figure, "view")[0] > 0.999
 
 
 def _check(page: Page, width: int) -> None:
