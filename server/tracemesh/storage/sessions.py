@@ -1,6 +1,8 @@
 """Sessions: the objects being scanned."""
 
-from sqlalchemy import delete, func, select
+from typing import Any
+
+from sqlalchemy import BigInteger, Row, Select, SQLColumnExpression, cast, delete, func, select
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import Conflict, NotFound
@@ -30,11 +32,11 @@ def list_sessions(transaction: Transaction, limit: int, after: str | None = None
 
     Raises NotFound for an unknown one.
     """
-    query = select(SessionRow)
+    query = _with_counts()
     if name:
         query = query.where(SessionRow.name.icontains(name, autoescape=True))
     last = None if after is None else session_row(transaction, after)
-    return [_session(transaction, row) for row in transaction.scalars(newest_first(query, SessionRow, last, limit))]
+    return [_described(row) for row in transaction.execute(newest_first(query, SessionRow, last, limit))]
 
 
 def get_session(transaction: Transaction, identifier: str) -> Session:
@@ -58,7 +60,7 @@ def delete_session(transaction: Transaction, identifier: str) -> None:
 
 def reading_count(transaction: Transaction, identifier: str) -> int:
     """Readings of fixed arrays in a session: they are numbered from 0 without a gap."""
-    last = transaction.scalar(select(func.max(ReadingRow.index)).where(ReadingRow.session_id == identifier))
+    last = transaction.scalar(_last_reading(identifier))
     return 0 if last is None else last + 1
 
 
@@ -78,28 +80,40 @@ def session_row(transaction: Transaction, identifier: str) -> SessionRow:
 
 
 def _session(transaction: Transaction, row: SessionRow) -> Session:
-    kept = (CurveRow.session_id == row.id) & ~CurveRow.removed
-    curves, samples = transaction.execute(
-        select(func.count(), func.coalesce(func.sum(CurveRow.samples), 0)).where(kept)
-    ).one()
-    same_curve = (MarkRow.recording_key == CurveRow.recording_key) & (MarkRow.number == CurveRow.number)
-    nodes = transaction.scalar(
-        select(func.count(MarkRow.node.distinct())).join_from(MarkRow, CurveRow, same_curve).where(kept)
-    )
+    return _described(transaction.execute(_with_counts().where(SessionRow.id == row.id)).one())
+
+
+def _described(found: Row[Any]) -> Session:
+    session = found.SessionRow
     return Session(
-        id=row.id,
-        name=row.name,
-        created=row.created,
-        curves=curves,
-        samples=int(samples),
-        nodes=nodes or 0,
-        readings=reading_count(transaction, row.id),
-        latest_reconstruction=_latest_reconstruction(transaction, row.id),
+        id=session.id,
+        name=session.name,
+        created=session.created,
+        curves=found.curves,
+        samples=found.samples,
+        nodes=found.nodes,
+        readings=0 if found.last_reading is None else found.last_reading + 1,
+        latest_reconstruction=found.latest,
     )
 
 
-def _latest_reconstruction(transaction: Transaction, identifier: str) -> str | None:
-    done = (ReconstructionRow.session_id == identifier) & (ReconstructionRow.state == "done")
-    return transaction.scalar(
-        select(ReconstructionRow.id).where(done).order_by(ReconstructionRow.created.desc()).limit(1)
+def _with_counts() -> Select[*tuple[Any, ...]]:
+    """Sessions with what is in each, as `_described` takes it: one query for however many."""
+    kept = (CurveRow.session_id == SessionRow.id) & ~CurveRow.removed
+    same_curve = (MarkRow.recording_key == CurveRow.recording_key) & (MarkRow.number == CurveRow.number)
+    done = (ReconstructionRow.session_id == SessionRow.id) & (ReconstructionRow.state == "done")
+    latest = select(ReconstructionRow.id).where(done).order_by(ReconstructionRow.created.desc()).limit(1)
+    samples = cast(func.coalesce(func.sum(CurveRow.samples), 0), BigInteger)
+    nodes = select(func.count(MarkRow.node.distinct())).join_from(MarkRow, CurveRow, same_curve).where(kept)
+    return select(
+        SessionRow,
+        select(func.count()).select_from(CurveRow).where(kept).scalar_subquery().label("curves"),
+        select(samples).where(kept).scalar_subquery().label("samples"),
+        nodes.scalar_subquery().label("nodes"),
+        _last_reading(SessionRow.id).scalar_subquery().label("last_reading"),
+        latest.scalar_subquery().label("latest"),
     )
+
+
+def _last_reading(session: SQLColumnExpression[str] | str) -> Select[Any]:
+    return select(func.max(ReadingRow.index)).where(ReadingRow.session_id == session)
