@@ -3,12 +3,12 @@
 import asyncio
 import gc
 import socket
+from typing import TYPE_CHECKING
 
 import uvicorn
 
 from tracemesh import logs
 from tracemesh.api.app import create_app
-from tracemesh.api.lan.serving import Lan
 from tracemesh.api.limits import PatientHttp
 from tracemesh.api.websocket import SteadyReading
 from tracemesh.api.welcome import greet, greet_phones
@@ -16,6 +16,9 @@ from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import open_artifacts
 from tracemesh.storage.database import Database, database_faults_in_words
+
+if TYPE_CHECKING:
+    from tracemesh.api.lan.serving import Lan
 
 MAX_MESSAGE = 4 * 2**20
 """Most bytes of one message on a socket."""
@@ -35,7 +38,7 @@ def serve(settings: Settings) -> None:
     logs.set_up(settings.log_format)
     _prepare(settings)
     _collect_garbage_seldom()
-    lan = Lan(settings) if settings.lan else None
+    lan = _lan(settings) if settings.lan else None
     try:
         _Server(configure(settings, lan), settings, lan).run()
     except SystemExit:  # uvicorn's word for an address that it could not have; its log says why
@@ -45,7 +48,13 @@ def serve(settings: Settings) -> None:
             lan.close()
 
 
-def configure(settings: Settings, lan: Lan | None = None) -> uvicorn.Config:
+def _lan(settings: Settings) -> "Lan":
+    from tracemesh.api.lan.serving import Lan  # what makes certificates takes memory that other servers save
+
+    return Lan(settings)
+
+
+def configure(settings: Settings, lan: "Lan | None" = None) -> uvicorn.Config:
     """How uvicorn is to serve the application."""
     return uvicorn.Config(
         create_app(settings),
@@ -77,7 +86,7 @@ def _collect_garbage_seldom() -> None:
 class _Server(uvicorn.Server):
     """Says how to come in as soon as it listens."""
 
-    def __init__(self, configuration: uvicorn.Config, settings: Settings, lan: Lan | None) -> None:
+    def __init__(self, configuration: uvicorn.Config, settings: Settings, lan: "Lan | None") -> None:
         super().__init__(configuration)
         self._settings = settings
         self._lan = lan

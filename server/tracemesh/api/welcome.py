@@ -1,13 +1,17 @@
 """What a server that demands a token says to the person who starts it."""
 
+from typing import TYPE_CHECKING
+
 import segno
 
 from tracemesh.api.lan.addresses import main_address
-from tracemesh.api.lan.authority import Authority
 from tracemesh.settings import Settings
 from tracemesh.storage.database import Database
 from tracemesh.storage.tokens import create_token, owner_exists
 from tracemesh.wire.access import TokenCreate
+
+if TYPE_CHECKING:
+    from tracemesh.api.lan.authority import Authority
 
 
 def greet(settings: Settings, port: int) -> None:
@@ -29,7 +33,7 @@ def greet(settings: Settings, port: int) -> None:
         )
 
 
-def greet_phones(authority: Authority, plain_port: int | None) -> None:
+def greet_phones(authority: "Authority", plain_port: int | None) -> None:
     """Print where a phone gets the certificate, which holds no secret, and its fingerprint to compare."""
     print(f"Certificate to trust  {authority.file}\nits SHA-256  {authority.fingerprint}", flush=True)
     if plain_port is not None:
