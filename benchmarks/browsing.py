@@ -1,4 +1,4 @@
-"""What the pages cost a browser: bytes before they work, time to the first view, script per live point, memory."""
+"""What the pages cost a browser: bytes before they work, first view, slider moves, script per live point, memory."""
 
 import gzip
 import json
@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from playwright.sync_api import CDPSession, Page, sync_playwright
+from playwright.sync_api import CDPSession, Locator, Page, sync_playwright
 from websockets.sync.client import ClientConnection, connect
 
-from benchmarks.data import ROOT, Data
+from benchmarks.data import ROOT, Data, noisy_scan
+from benchmarks.measuring import Floats
 from benchmarks.serving import serving
 from benchmarks.table import Cell, Column, Table
 from tracemesh.formats.rawnet import write_rawnet
@@ -29,6 +30,8 @@ FLAGS = [
 LIVE_POINTS, SAMPLE = 1000, 0.003
 """Points of one timed batch, and m between samples: as far apart as live points are drawn."""
 BATCHES = 20
+MOVES = 20
+"""Timed moves of a slider."""
 MINUTES, RATE, SPEED = 30, 60, 0.08
 """A long ride: min, samples a second, m/s."""
 
@@ -36,10 +39,13 @@ COLUMNS = (Column("what"), Column("budget"), Column("measured", ".1f"), Column("
 NOTES = (
     """Built pages in headless Chromium on the same machine, WebGL in software. First load: every script and style that
     a page needs at once, compressed with gzip. First view: from the address to the surface on the screen, of a session
-    whose live curves have so many points and whose surface has so many triangles; the median of five. Script: what the
-    browser reports as script time while messages with so many new live points come in one by one, per message. Heap: of
-    the page after garbage collection, at the end of so many minutes of live data; its growth is that less what it was
-    after a tenth of them, less the points themselves (12 bytes each). The ride is sent as fast as it is taken.""",
+    whose live curves have so many points and whose surface has so many triangles; the median of five. Slider: from its
+    input event to the end of the first frame that shows the network so asked for, of a noisy leaf cut as finely as the
+    slider allows; each move asks for something new, once the one before was seen; the first one is not counted. Script:
+    what the browser reports as script time while messages with so many new live points come in one by one, per
+    message. Heap: of the page after garbage collection, at the end of so many minutes of live data; its growth is that
+    less what it was after a tenth of them, less the points themselves (12 bytes each). The ride is sent as fast as it
+    is taken.""",
 )
 
 
@@ -55,7 +61,8 @@ def browsing(data: Data, minutes: float = MINUTES) -> Table:
         address = f"127.0.0.1:{server.port}"
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         page = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
-        rows += [_first_view(page, address), _script(page, address), *_memory(page, address, minutes)]
+        rows += [_first_view(page, address), *_sliders(page, address)]
+        rows += [_script(page, address), *_memory(page, address, minutes)]
         browser.close()
     return Table("browsing", "The pages in a browser", COLUMNS, tuple(rows), NOTES)
 
@@ -102,6 +109,44 @@ def _first_view(page: Page, address: str) -> tuple[Cell, ...]:
     points = sum(len(c["positions"]) // 3 for c in _snapshot(address, session)["curves"])
     triangles = page.locator("canvas").get_attribute("data-triangles")
     return (f"first view, {points} points and {triangles} triangles", "1500", 1000 * float(np.median(waits)), "ms")
+
+
+MOVE = """(slider, handle) => new Promise((seen) => {
+  const drawn = () => requestAnimationFrame(() => setTimeout(() => seen(performance.now() - begin)));
+  const watch = new MutationObserver(() => (watch.disconnect(), drawn()));
+  watch.observe(document.querySelector("canvas[data-revision]"), { attributeFilter: ["data-revision"] });
+  slider.step = "any";
+  slider.value = handle;
+  const begin = performance.now();
+  slider.dispatchEvent(new Event("input", { bubbles: true }));
+})"""
+"""Moves the handle of a slider; ms until the network that this asks for is on the screen."""
+
+
+def _sliders(page: Page, address: str) -> list[tuple[Cell, ...]]:
+    """Moves of the step and of a smoothing length, near the finest step."""
+    session = _call(address, "/sessions", b"{}")["id"]
+    _call(address, f"/sessions/{session}/recordings", write_rawnet(noisy_scan("leaf").scan).encode())
+    page.goto(f"http://{address}/#/sessions/{session}")
+    page.get_by_role("button", name="5 interior").wait_for()
+    page.wait_for_load_state("networkidle")
+    page.get_by_text("Parameters").click()
+    step, stretch = (page.get_by_role("slider", name=name) for name in ("Step", "Stretch"))
+    coarser = _moves(step, np.linspace(0.04, 0, MOVES + 1))
+    page.get_by_title("Smooths over this length by resisting change of direction").get_by_role("checkbox").uncheck()
+    with page.expect_response(re.compile("/preview")) as answer:
+        smoother = _moves(stretch, np.linspace(0.1, 0.5, MOVES + 1))
+    points = sum(len(curve["positions"]) // 3 for curve in answer.value.json()["curves"])
+    return [
+        (f"{name} slider, {points} samples, {words}", "100", float(np.quantile(waits, part)), "ms")
+        for name, waits in (("step", coarser), ("stretch", smoother))
+        for words, part in (("median", 0.5), ("95 %", 0.95))
+    ]
+
+
+def _moves(slider: Locator, handles: Floats) -> list[float]:
+    """ms until each move but the first is answered."""
+    return [float(slider.evaluate(MOVE, float(handle))) for handle in handles][1:]
 
 
 def _script(page: Page, address: str) -> tuple[Cell, ...]:
