@@ -4,6 +4,7 @@ import asyncio
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
@@ -121,7 +122,10 @@ class Previewer:
         return await asyncio.to_thread(write_rawnet, begun_at_nodes(loaded.scan))
 
     async def problems(self, session: str) -> NetworkProblems:
-        """What keeps a session's curves from becoming a surface; raises NotFound."""
+        """What keeps a session's curves from becoming a surface; raises NotFound.
+
+        Pages ask when they show curves, so the process is then made ready for the first move of a slider.
+        """
         if await self._of_array(session, None):  # what is declared hangs together
             return NetworkProblems(problems=[])
         try:
@@ -131,6 +135,8 @@ class Previewer:
         by_index = {curve.index: curve for curve in loaded.curves}
         async with self._turn:
             found = await self._run(find_problems, loaded.scan, [by_index[i] for i in loaded.indices])
+        with suppress(BrokenProcessPool):  # closed meanwhile
+            self._slot.prepare(_load_solver)
         return NetworkProblems(problems=found)
 
     async def _of_array(self, session: str, number: int | None) -> StoredReading | None:
@@ -186,6 +192,11 @@ def _marked(scan: Scan, indices: Sequence[int], wanted: Sequence[CurveMarks]) ->
             raise InputError(f"curve {change.curve} has {count} samples, got a mark at sample {beyond[0]}")
         curves[place] = with_marks(curves[place], [(mark.sample, mark.node) for mark in change.marks])
     return Scan(tuple(curves))
+
+
+def _load_solver() -> None:
+    """What previews need is loaded while nobody waits for it."""
+    import tracemesh.jobs.warm  # noqa: F401
 
 
 def _solve(name: str, scan: Scan, indices: Sequence[int], wanted: PreviewWish, budget: int) -> SolvedNetwork:
