@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, CDPSession, Page, expect, sync_playwright
+from scipy.spatial.transform import Rotation
 
 from tracemesh.formats.meshes import write_triangles
 from tracemesh.geometry.simulated.moving_arrays import NOISE, lattice
@@ -150,11 +151,51 @@ def show_theme_and_phone(browser: Browser, address: str) -> None:
     phone.goto(address.replace("/#/sessions/", "/scan.html#"))
     keep(phone, "scan-start")
     phone.close()
+    show_air(browser, address.split("/#/")[0])
+
+
+def show_air(browser: Browser, origin: str) -> None:
+    """Two strokes drawn in the air, the browser's own orientation sensor overridden; it goes on moving."""
+    request = urllib.request.Request(f"{origin}/api/v1/sessions", b'{"id": "air", "name": "In the air"}')
+    request.add_header("Content-Type", "application/json")
+    urllib.request.urlopen(request, timeout=20).close()
+    granted = ["accelerometer", "gyroscope", "magnetometer"]
+    phone = browser.new_page(viewport=PHONE, device_scale_factor=2, reduced_motion="reduce", permissions=granted)
+    hand = phone.context.new_cdp_session(phone)
+    sensor, metadata = "absolute-orientation", {"available": True, "maximumFrequency": 60, "minimumFrequency": 1}
+    hand.send("Emulation.setSensorOverrideEnabled", {"enabled": True, "type": sensor, "metadata": metadata})
+    phone.goto(f"{origin}/scan.html#air")
+    phone.get_by_role("button", name="Use this device's sensors").click()
+    lead(phone, hand, 0.0, 0.1)
+    phone.get_by_role("button", name="in the air").click()
+    for start, end in ((0.0, 2.4), (2.4, 4.2)):
+        phone.get_by_role("button", name="Hold to draw").hover()
+        phone.mouse.down()
+        lead(phone, hand, start, end)
+        phone.mouse.up()
+    lead(phone, hand, 4.2, 4.8)
+    shoot(phone, "scan-in-the-air")
+    phone.close()
+
+
+def lead(phone: Page, hand: CDPSession, start: float, end: float) -> None:
+    """The phone around a circle, top edge first, from one place to another, rad."""
+    for angle in np.arange(start, end, 0.01):
+        axes = Rotation.from_euler("zx", [angle, 0.9])
+        x, y, z, w = (float(v) for v in axes.as_quat())
+        reading = {"quaternion": {"x": x, "y": y, "z": z, "w": w}}
+        hand.send("Emulation.setSensorOverrideReadings", {"type": "absolute-orientation", "reading": reading})
+        phone.wait_for_timeout(16)
 
 
 def keep(page: Page, name: str) -> None:
     """One picture, once everything has settled."""
     page.wait_for_timeout(800)
+    shoot(page, name)
+
+
+def shoot(page: Page, name: str) -> None:
+    """One picture as it is now."""
     folder = PICTURES / "page"
     folder.mkdir(exist_ok=True)
     page.screenshot(path=folder / f"{name}.jpg", type="jpeg", quality=85)
