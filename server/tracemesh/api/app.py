@@ -2,13 +2,12 @@
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
-from sqlalchemy.exc import SQLAlchemyError
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 
@@ -43,7 +42,6 @@ from tracemesh.api.routes import (
     tokens,
 )
 from tracemesh.api.services import Services
-from tracemesh.errors import Unavailable
 from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import ArtifactStore, open_artifacts
@@ -55,6 +53,8 @@ from tracemesh.wire.device import Recorded
 from tracemesh.wire.resources import Problem, Reconstruction
 
 log = logging.getLogger(__name__)
+CHECKPOINT_INTERVAL = 1.0
+"""s between two copies of SQLite's log into its main file."""
 TIDY_INTERVAL = 3600.0
 """s between two searches for artifacts that nobody needs."""
 ROUTES = (
@@ -117,11 +117,15 @@ async def running(settings: Settings) -> AsyncIterator[Services]:
     database = Database(settings.resolved_database_url)
     await asyncio.to_thread(database.migrate)
     services, elsewhere = _connected(settings, database)
-    tidying = asyncio.create_task(_collect_garbage(database, services.artifacts))
+    housekeeping = [
+        asyncio.create_task(_now_and_then(TIDY_INTERVAL, _collect_garbage, database, services.artifacts)),
+        asyncio.create_task(_now_and_then(CHECKPOINT_INTERVAL, Database.checkpoint, database)),
+    ]
     try:
         yield services
     finally:
-        tidying.cancel()
+        for task in housekeeping:
+            task.cancel()
         await _close(services, elsewhere)
 
 
@@ -168,17 +172,18 @@ async def _close(services: Services, elsewhere: Elsewhere) -> None:
     services.database.close()
 
 
-async def _collect_garbage(database: Database, store: ArtifactStore) -> None:
-    """Now and then for ever; what is away is only tidied later."""
-
-    def collect() -> int:
-        with database.read() as transaction:
-            return store.remove_unreferenced(transaction)
-
+async def _now_and_then(pause: float, work: Callable[..., None], *arguments: object) -> None:
+    """On a thread, at once and then every so many seconds; what fails is only done later."""
     while True:
         try:
-            if removed := await asyncio.to_thread(collect):
-                log.info("removed %d artifacts that no reconstruction has any more", removed)
-        except (OSError, SQLAlchemyError, Unavailable) as error:
-            log.warning("artifacts could not be tidied: %s", error)
-        await asyncio.sleep(TIDY_INTERVAL)
+            await asyncio.to_thread(work, *arguments)
+        except Exception as error:
+            log.warning("housekeeping is put off: %s", error)
+        await asyncio.sleep(pause)
+
+
+def _collect_garbage(database: Database, store: ArtifactStore) -> None:
+    with database.read() as transaction:
+        removed = store.remove_unreferenced(transaction)
+    if removed:
+        log.info("removed %d artifacts that no reconstruction has any more", removed)

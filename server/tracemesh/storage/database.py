@@ -1,7 +1,7 @@
 """The database: one engine, short transactions, one schema kept by migrations."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from alembic import command
@@ -17,6 +17,8 @@ from sqlalchemy.pool import ConnectionPoolEntry
 
 from tracemesh.errors import ResourceError
 
+MAX_WAL_PAGES = 16_384
+"""Pages (of 4 KiB) of SQLite's log at which a writer begins it anew; by then nearly all are in the main file."""
 BUSY_TIMEOUT = 30
 """s that SQLite waits for another writer."""
 
@@ -44,6 +46,15 @@ class Database:
         ):
             yield session
             session.flush()
+
+    def checkpoint(self) -> None:
+        """Copy what was committed to SQLite's log into its main file, while others read and write.
+
+        Without it a writer does so itself, in the middle of its work, and waits for the disk.
+        """
+        if self.engine.dialect.name == "sqlite":
+            with closing(self.engine.raw_connection()) as connection:
+                connection.cursor().execute("PRAGMA wal_checkpoint(PASSIVE)")
 
     def close(self) -> None:
         """Close all connections."""
@@ -104,7 +115,7 @@ def _engine(url: str) -> Engine:
 def _configure_sqlite(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
     connection.isolation_level = None  # transactions begin where SQLAlchemy says
     cursor = connection.cursor()
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", f"wal_autocheckpoint={MAX_WAL_PAGES}"):
         cursor.execute(f"PRAGMA {pragma}")
     cursor.close()
 
