@@ -65,6 +65,10 @@ def test_a_late_joiner_sees_everything_and_looks_closer(
     expect(view).to_have_attribute("data-surface", "shown")
     assert server.call("GET", f"/reconstructions/{job['id']}")["state"] == "done"
 
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog", name="Keys")).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog", name="Keys")).to_have_count(0)
     page.keyboard.press("b")
     expect(page.get_by_role("img", name="Gauss map").locator("path")).not_to_have_count(0)
 

@@ -32,6 +32,7 @@ export function padNumber(event: KeyboardEvent): number | undefined {
 function isTaken({ target, key }: KeyboardEvent): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target instanceof HTMLInputElement && target.type === "range") return key.startsWith("Arrow");
+  if (key === "Escape" && target.closest("dialog")) return true;
   if (key === " ") return target.matches("button, a, summary, input");
   const field = target instanceof HTMLInputElement && !["checkbox", "radio"].includes(target.type);
   const chooses = target instanceof HTMLInputElement && target.type === "radio" && key.startsWith("Arrow");
