@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +65,8 @@ def test_a_node_is_drawn_along_its_curve(server: Server, page: Page, session: st
 
 
 def test_a_node_dropped_on_another_joins_it_and_is_split_off_again(server: Server, page: Page, session: str) -> None:
-    before, start, end = _marks(server, session), _place(page, 1), _place(page, 4)
-    page.mouse.move(*start)
-    page.mouse.down()
-    page.mouse.move(start[0] + 10, start[1], steps=2)
-    page.mouse.move(*end, steps=6)
-    expect(page.get_by_text("1 joins 4")).to_be_visible()
+    before = _marks(server, session)
+    _hold_over(page, 1, 4)
     page.mouse.up()
     expect(_nodes(page)).to_have_count(4)
     joined = _marks(server, session)
@@ -177,7 +174,16 @@ def _settled(page: Page) -> None:
 
 
 def _place(page: Page, node: int) -> tuple[float, float]:
-    """Where a node's dot is in the window, px."""
+    """Where a node's dot is in the window once it rests, px."""
+    place = _seen(page, node)
+    while True:
+        page.wait_for_timeout(400)
+        before, place = place, _seen(page, node)
+        if place == before:
+            return place
+
+
+def _seen(page: Page, node: int) -> tuple[float, float]:
     found = page.evaluate(
         """(node) => {
           const labels = [...document.querySelectorAll("main svg text")].map((t) => t.textContent);
@@ -188,6 +194,21 @@ def _place(page: Page, node: int) -> tuple[float, float]:
         node,
     )
     return found[0], found[1]
+
+
+def _hold_over(page: Page, node: int, other: int) -> None:
+    """Take a node to another one; once more if it had moved from under the pointer, which then turned the view."""
+    for _ in range(10):
+        start, end = _place(page, node), _place(page, other)
+        page.mouse.move(*start)
+        page.mouse.down()
+        page.mouse.move(start[0] + 10, start[1], steps=2)
+        page.mouse.move(*end, steps=6)
+        with suppress(AssertionError):
+            expect(page.get_by_text(f"{node} joins {other}")).to_be_visible(timeout=5000)
+            return
+        page.mouse.up()
+    raise AssertionError(f"node {node} cannot be taken to node {other}")
 
 
 def _find_curve_near(page: Page, place: tuple[float, float]) -> None:
