@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from tracemesh.errors import ResourceError
+from tracemesh.storage.postgresql import postgresql_engine
 
 MAX_WAL_PAGES = 16_384
 """Pages (of 4 KiB) of SQLite's log at which a writer begins it anew; by then nearly all are in the main file."""
@@ -100,10 +101,7 @@ def migrations() -> Config:
 def _engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
-        try:
-            return create_engine(parsed, pool_pre_ping=True)
-        except ImportError:
-            raise ResourceError("PostgreSQL wants another package: pip install 'tracemesh[postgres]'") from None
+        return postgresql_engine(parsed)
     if parsed.database:
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
     engine = create_engine(parsed, connect_args={"timeout": BUSY_TIMEOUT, "check_same_thread": False})
