@@ -76,7 +76,8 @@ class Bridge:
         def read() -> None:
             try:
                 for reading in self._source.readings(stop):
-                    loop.call_soon_threadsafe(self._take, reading)
+                    # the device is asked again only when this is on disk: a kill costs one answer at most
+                    asyncio.run_coroutine_threadsafe(self._take(reading), loop).result()
             except Exception as error:  # whatever it is, the operator must hear of it
                 self._failure = error
             loop.call_soon_threadsafe(self._stop.set)
@@ -86,7 +87,6 @@ class Bridge:
         await self._stop.wait()
         stop.set()
         await asyncio.to_thread(thread.join)
-        await asyncio.sleep(0)  # what the thread handed over last
 
     async def _send_rest(self) -> None:
         with suppress(SpoolError):
@@ -133,7 +133,7 @@ class Bridge:
             self._console.status(self._status)
             await asyncio.sleep(ARRAY_TICK if self._of_array else TICK)
 
-    def _take(self, reading: Reading | ArrayReading) -> None:
+    async def _take(self, reading: Reading | ArrayReading) -> None:
         with suppress(SpoolError):  # counted by the recorder, told by _keep_durable
             self._recorder.add(reading)
 
