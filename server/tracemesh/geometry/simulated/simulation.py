@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
 from tracemesh.geometry.simulated.shape_curves import ShapeCurve
 from tracemesh.geometry.simulated.shapes import Shape
@@ -249,7 +249,7 @@ class _Motion:
 
 def _vectors(frames: Floats, heading: float) -> Floats:
     """What undisturbed sensors see: m = A^T e, with the magnetic field turned by `heading` about the vertical."""
-    turned = Rotation.from_rotvec([0.0, 0.0, heading]).apply(REFERENCE_MAGNETIC)
+    turned = exp(np.array([0.0, 0.0, heading])) @ REFERENCE_MAGNETIC
     return np.stack([e @ frames for e in (np.array(REFERENCE_ACCELERATION), turned)])
 
 
