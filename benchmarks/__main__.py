@@ -24,6 +24,7 @@ from benchmarks import (
 )
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
+from benchmarks.measuring import yardstick
 from benchmarks.report import read_report, record, write_report
 from benchmarks.table import Table
 
@@ -62,10 +63,11 @@ def main(arguments: list[str]) -> int:
     data, folder = Data.beside_checkout(), ROOT / "docs"
     report = read_report(folder / "benchmarks.json", machine())
     for name in chosen:
-        begin, now = perf_counter(), datetime.now(UTC).date().isoformat()
+        length, now = yardstick(), datetime.now(UTC).date().isoformat()
+        begin = perf_counter()
         table = TABLES[name](data)
         print(table.markdown(), flush=True)
-        report["tables"][name] = record(table, now, revision(ROOT), perf_counter() - begin)
+        report["tables"][name] = record(table, now, revision(ROOT), perf_counter() - begin, length)
         write_report(folder, report, list(TABLES))
     return 0
 

@@ -2,18 +2,19 @@
 
 import json
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 from benchmarks.table import Table
 
 
 class Record(TypedDict):
-    """One table as it was measured: when, of which commit, in how many seconds."""
+    """One table as it was measured: when, of which commit, in how many seconds; s of the yardstick just before."""
 
     table: dict[str, Any]
     measured: str
     revision: str
     seconds: float
+    yardstick: NotRequired[float]
 
 
 class Report(TypedDict):
@@ -26,12 +27,13 @@ HEAD = """# Benchmarks
 Written by `make bench` (`python -m benchmarks`; with the names of tables it measures these alone and keeps the others);
 the same figures unrounded are in [benchmarks.json](benchmarks.json). No figure is typed in except published ones, which
 are named as such. The kernel's times are processor times with one thread: what a clock shows on a machine that does
-nothing else.
+nothing else. Machines that call themselves the same were seen to differ by a factor of two: the yardstick below a table
+is the processor time of one piece of work that never changes, just before the table was measured.
 """
 
 
-def record(table: Table, measured: str, revision: str, seconds: float) -> Record:
-    return Record(table=table.document(), measured=measured, revision=revision, seconds=seconds)
+def record(table: Table, measured: str, revision: str, seconds: float, yardstick: float) -> Record:
+    return Record(table=table.document(), measured=measured, revision=revision, seconds=seconds, yardstick=yardstick)
 
 
 def read_report(path: Path, machine: dict[str, object]) -> Report:
@@ -61,5 +63,6 @@ def _machine(machine: dict[str, object]) -> str:
 
 
 def _section(entry: Record) -> str:
-    foot = f"Measured {entry['measured']}, commit {entry['revision']}, in {entry['seconds']:.0f} s."
+    foot = f"Measured {entry['measured']}, commit {entry['revision']}, in {entry['seconds']:.0f} s"
+    foot += f"; yardstick {1000 * entry['yardstick']:.0f} ms." if "yardstick" in entry else "."
     return f"{Table.read(entry['table']).markdown()}\n{foot}\n"

@@ -51,9 +51,10 @@ def test_report_keeps_other_tables_of_the_same_machine_only(tmp_path: Path) -> N
     table = Table("one", "First", (Column("a"),), (("x",),))
     machine: dict[str, object] = {"processor": "p", "packages": {"numpy": "2"}}
     report = read_report(tmp_path / "benchmarks.json", machine)
-    report["tables"]["one"] = record(table, "2026-01-01", "abc", 1.0)
+    report["tables"]["one"] = record(table, "2026-01-01", "abc", 1.0, 0.0404)
     write_report(tmp_path, report, ["two", "one"])
     assert "## First" in (tmp_path / "benchmarks.md").read_text()
+    assert "in 1 s; yardstick 40 ms." in (tmp_path / "benchmarks.md").read_text()
     assert json.loads((tmp_path / "benchmarks.json").read_text())["tables"]["one"]["table"]["rows"] == [["x"]]
     assert list(read_report(tmp_path / "benchmarks.json", machine)["tables"]) == ["one"]
     assert read_report(tmp_path / "benchmarks.json", {**machine, "processor": "q"})["tables"] == {}
