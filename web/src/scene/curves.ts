@@ -41,7 +41,7 @@ export class CurvesLayer {
       const old = before.get(index);
       const count = shown.curve.points.count;
       shown.from = animated && old && old.length > 3 ? resample(old, count) : undefined;
-      shown.positions = Float32Array.from(shown.from ?? shown.curve.points.coordinates);
+      shown.positions = (shown.from ?? shown.curve.points.coordinates).slice();
       shown.line.set(shown.positions);
     }
     this.#progress = animated ? 0 : 1;
@@ -130,10 +130,11 @@ export class CurvesLayer {
   }
 }
 
-/** The points on the screen, lengthened (or cut) to the truth's length; while moving, the old ones stay where they are. */
+/** The points on the screen, lengthened (or cut) to the truth's length; while moving, the old ones stay where they are.
+ * At rest these are the truth's own: no copy of a long curve for every few points. */
 function withTail(shown: Float32Array, target: Float32Array, moving: boolean): Float32Array {
-  if (!moving) return Float32Array.from(target);
-  const result = Float32Array.from(target);
+  if (!moving) return target;
+  const result = target.slice();
   result.set(shown.subarray(0, Math.min(shown.length, target.length)));
   return result;
 }

@@ -60,8 +60,8 @@ export class Polyline {
   #write(positions: Float32Array, start: number, segments: number): void {
     const buffer = segmentBuffer(this.#geometry);
     const array = buffer.array as Float32Array;
-    for (let i = start; i < segments; i += 1) {
-      array.set(positions.subarray(3 * i, 3 * i + FLOATS_PER_SEGMENT), FLOATS_PER_SEGMENT * i);
+    for (let from = 3 * start, to = FLOATS_PER_SEGMENT * start; from < 3 * segments; from += 3) {
+      for (let k = 0; k < FLOATS_PER_SEGMENT; k += 1, to += 1) array[to] = positions[from + k] as number;
     }
     buffer.addUpdateRange(FLOATS_PER_SEGMENT * start, FLOATS_PER_SEGMENT * Math.max(segments - start, 0));
     buffer.needsUpdate = true;

@@ -214,8 +214,8 @@ export class Viewport {
   }
 
   #measure(network: Network, swept: Box | undefined): void {
-    const before = swept ? [swept.min, swept.max] : [];
-    this.#box = boundingBox([...[...network.curves.values()].map((curve) => curve.points.coordinates), ...before]);
+    const boxes = [...[...network.curves.values()].map((curve) => curve.points.box), swept];
+    this.#box = boundingBox(boxes.flatMap((box) => (box ? [box.min, box.max] : [])));
     if (!this.#box) return;
     const { min, max } = this.#box;
     const size = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]);

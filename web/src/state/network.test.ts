@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { boundingBox } from "../geometry/vectors";
 import type { ToBrowser } from "../protocol/messages";
 import { type DrawnCurve, Network, Points, stretchOf } from "./network";
 
@@ -22,6 +23,16 @@ describe("Points", () => {
     }
     expect(growing.count).toBe(1000);
     expect([...growing.coordinates]).toEqual(plain);
+  });
+
+  it("know the smallest box around them, whatever was added or overwritten", () => {
+    const growing = new Points();
+    expect(growing.box).toBeUndefined();
+    for (let i = 0; i < 300; i += 1) {
+      const first = i % 7 ? growing.count : Math.floor(growing.count / 2);
+      growing.splice(first, [Math.sin(i) * i, Math.cos(3 * i), -i % 11, i % 5, i % 3, Math.sin(2 * i)]);
+      if (i % 3) expect(growing.box).toEqual(boundingBox([growing.coordinates]));
+    }
   });
 
   it("are overwritten from a point on, and refuse to leave a gap", () => {

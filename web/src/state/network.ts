@@ -1,4 +1,5 @@
 import type { LiveCurve, NodePosition } from "../wire.gen";
+import { type Box, boundingBox } from "../geometry/vectors";
 import type { ToBrowser } from "../protocol/messages";
 
 /** Points that grow at the end: [x0, y0, z0, x1, ...] in m, world (ENU, z up). */
@@ -6,6 +7,9 @@ export class Points {
   #data: Float32Array;
   #length = 0;
   #samples: number[];
+  #box: Box | undefined;
+  /** Coordinates that the box knows. */
+  #boxed = 0;
 
   /** `samples`: for each point the sample of its curve that it is at; empty where that is not known. */
   constructor(positions: ArrayLike<number> = [], samples: readonly number[] = []) {
@@ -29,9 +33,20 @@ export class Points {
     return this.#samples;
   }
 
+  /** The smallest box around all points, none without points; only what was added since the last call is looked at. */
+  get box(): Box | undefined {
+    if (this.#boxed < this.#length) {
+      const added = this.#data.subarray(this.#boxed, this.#length);
+      this.#box = boundingBox(this.#box ? [this.#box.min, this.#box.max, added] : [added]);
+      this.#boxed = this.#length;
+    }
+    return this.#box;
+  }
+
   /** Replace everything from point `first` on; false when points before `first` are missing. */
   splice(first: number, positions: ArrayLike<number>, samples: readonly number[] = []): boolean {
     if (first > this.count) return false;
+    if (3 * first < this.#boxed) [this.#box, this.#boxed] = [undefined, 0];
     this.#samples.length = Math.min(first, this.#samples.length);
     for (const sample of samples) this.#samples.push(sample);
     const length = 3 * first + positions.length;
