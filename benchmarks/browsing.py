@@ -37,15 +37,15 @@ MINUTES, RATE, SPEED = 30, 60, 0.08
 
 COLUMNS = (Column("what"), Column("budget"), Column("measured", ".1f"), Column("unit"))
 NOTES = (
-    """Built pages in headless Chromium on the same machine, WebGL in software. First load: every script and style that
-    a page needs at once, compressed with gzip. First view: from the address to the surface on the screen, of a session
-    whose live curves have so many points and whose surface has so many triangles; the median of five. Slider: from its
-    input event to the end of the first frame that shows the network so asked for, of a noisy leaf cut as finely as the
-    slider allows; each move asks for something new, once the one before was seen; the first one is not counted. Script:
-    what the browser reports as script time while messages with so many new live points come in one by one, per
-    message. Heap: of the page after garbage collection, at the end of so many minutes of live data; its growth is that
-    less what it was after a tenth of them, less the points themselves (12 bytes each). The ride is sent as fast as it
-    is taken.""",
+    """Built pages in headless Chromium on the same machine, WebGL in software. First load: every script and style
+    that a page needs at once, compressed with gzip. First view: from the address to the surface on the screen, of a
+    session whose live curves have so many points and whose surface has so many triangles; the median of five.
+    Slider: from its input event until the answer has come, and to the end of the first frame that shows the network
+    so asked for, of a noisy leaf cut as finely as the slider allows; each move asks for something new, once the one
+    before was seen; the first one is not counted. Script: what the browser reports as script time while messages
+    with so many new live points come in one by one, per message. Heap: of the page after garbage collection, at the
+    end of so many minutes of live data; its growth is that less what it was after a tenth of them, less the points
+    themselves (12 bytes each). The ride is sent as fast as it is taken.""",
 )
 
 
@@ -112,15 +112,19 @@ def _first_view(page: Page, address: str) -> tuple[Cell, ...]:
 
 
 MOVE = """(slider, handle) => new Promise((seen) => {
-  const drawn = () => requestAnimationFrame(() => setTimeout(() => seen(performance.now() - begin)));
+  const isAnswer = (entry) => entry.name.includes("/preview");
+  const answered = () => performance.getEntriesByType("resource").findLast(isAnswer).responseEnd;
+  const drawn = () =>
+    requestAnimationFrame(() => setTimeout(() => seen([answered() - begin, performance.now() - begin])));
   const watch = new MutationObserver(() => (watch.disconnect(), drawn()));
   watch.observe(document.querySelector("canvas[data-revision]"), { attributeFilter: ["data-revision"] });
+  performance.clearResourceTimings();
   slider.step = "any";
   slider.value = handle;
   const begin = performance.now();
   slider.dispatchEvent(new Event("input", { bubbles: true }));
 })"""
-"""Moves the handle of a slider; ms until the network that this asks for is on the screen."""
+"""Moves the handle of a slider; ms until the network that this asks for has come, and until it is on the screen."""
 
 
 def _sliders(page: Page, address: str) -> list[tuple[Cell, ...]]:
@@ -138,15 +142,16 @@ def _sliders(page: Page, address: str) -> list[tuple[Cell, ...]]:
         smoother = _moves(stretch, np.linspace(0.1, 0.5, MOVES + 1))
     points = sum(len(curve["positions"]) // 3 for curve in answer.value.json()["curves"])
     return [
-        (f"{name} slider, {points} samples, {words}", "100", float(np.quantile(waits, part)), "ms")
-        for name, waits in (("step", coarser), ("stretch", smoother))
+        (f"{name} slider, {points} samples, {what}, {words}", "100", float(np.quantile(waits, part)), "ms")
+        for name, moves in (("step", coarser), ("stretch", smoother))
+        for what, waits in zip(("answer", "on the screen"), moves.T, strict=True)
         for words, part in (("median", 0.5), ("95 %", 0.95))
     ]
 
 
-def _moves(slider: Locator, handles: Floats) -> list[float]:
-    """ms until each move but the first is answered."""
-    return [float(slider.evaluate(MOVE, float(handle))) for handle in handles][1:]
+def _moves(slider: Locator, handles: Floats) -> Floats:
+    """ms (n, 2) until each move but the first is answered, and until the answer is on the screen."""
+    return np.array([slider.evaluate(MOVE, float(handle)) for handle in handles][1:])
 
 
 def _script(page: Page, address: str) -> tuple[Cell, ...]:

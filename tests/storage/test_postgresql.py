@@ -57,6 +57,7 @@ class Line:
         self._clients.clear()
 
     def close(self) -> None:
+        self._listening.shutdown(socket.SHUT_RDWR)  # wakes who waits in accept
         self._listening.close()
         self.cut()
 
