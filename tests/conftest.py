@@ -1,5 +1,6 @@
 """What tests of every area share."""
 
+import gc
 import os
 import shutil
 import socket
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -64,6 +66,14 @@ def postgresql() -> Iterator[PostgreSql]:
     )
     run("pg_ctl", "-w", "-m", "immediate", "stop")
     shutil.rmtree(folder)
+
+
+@pytest.fixture
+def torn_connections() -> Iterator[None]:
+    """For who tears connections to PostgreSQL: pg8000 leaves their sockets to the garbage collector, which warns."""
+    warnings.filterwarnings("ignore", "unclosed <socket", ResourceWarning)
+    yield
+    gc.collect()
 
 
 @pytest.fixture(scope="session")

@@ -232,7 +232,7 @@ def test_an_artifact_store_that_is_away_is_told(start: Start, settings: Settings
 
 
 @embedded
-@pytest.mark.usefixtures("quick_lease")
+@pytest.mark.usefixtures("torn_connections", "quick_lease")
 @pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
 def test_a_database_that_crashes_under_a_job_costs_at_most_an_attempt(
     start: Start, database: Database, postgresql: Any

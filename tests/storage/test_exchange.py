@@ -58,6 +58,7 @@ def test_news_are_told_only_once_what_they_tell_of_is_committed(servers: list[Se
     assert servers[1].heard.get(timeout=30) == NEWS[3]
 
 
+@pytest.mark.usefixtures("torn_connections")
 def test_whoever_could_not_listen_knows_that_it_may_have_missed_something(
     servers: list[Server], postgresql: PostgreSql
 ) -> None:

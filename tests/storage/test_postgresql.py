@@ -14,6 +14,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from tracemesh.storage.database import Database
 from tracemesh.storage.models import SessionRow
 
+pytestmark = pytest.mark.usefixtures("torn_connections")
+
 
 class Line:
     """Stands between a client and a server and looks at what the client says; `cut` resets all connections."""
