@@ -63,11 +63,11 @@ def main(arguments: list[str]) -> int:
     data, folder = Data.beside_checkout(), ROOT / "docs"
     report = read_report(folder / "benchmarks.json", machine())
     for name in chosen:
-        length, now = yardstick(), datetime.now(UTC).date().isoformat()
+        standard, now = yardstick(), datetime.now(UTC).date().isoformat()
         begin = perf_counter()
         table = TABLES[name](data)
         print(table.markdown(), flush=True)
-        report["tables"][name] = record(table, now, revision(ROOT), perf_counter() - begin, length)
+        report["tables"][name] = record(table, now, revision(ROOT), perf_counter() - begin, standard)
         write_report(folder, report, list(TABLES))
     return 0
 

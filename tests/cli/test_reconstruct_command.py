@@ -1,8 +1,10 @@
-"""`tracemesh reconstruct`, `surface` and `evaluate` as a stranger runs them: real processes, real files."""
+"""`tracemesh reconstruct`, `surface` and `evaluate` as a stranger runs them: real files, and real processes."""
 
 import json
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +12,20 @@ import numpy as np
 import pytest
 import trimesh
 
+from tracemesh.cli import main
 
-def tracemesh(*arguments: object, stdin: str | None = None) -> subprocess.CompletedProcess[str]:
+
+def tracemesh(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run the command within this process: a new one costs two seconds of imports."""
+    command = list(map(str, arguments))
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err, pytest.raises(SystemExit) as end:
+        main(command)
+    assert isinstance(end.value.code, int)
+    return subprocess.CompletedProcess(command, end.value.code, out.getvalue(), err.getvalue())
+
+
+def tracemesh_process(*arguments: object, stdin: str | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the command as a process of its own."""
     command = [sys.executable, "-m", "tracemesh", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, input=stdin, timeout=120)
 
@@ -20,7 +34,7 @@ def tracemesh(*arguments: object, stdin: str | None = None) -> subprocess.Comple
 def lilium(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The thesis author's own network, reconstructed into a folder."""
     folder = tmp_path_factory.mktemp("lilium")
-    done = tracemesh(
+    done = tracemesh_process(
         "reconstruct",
         *(shared_data / "lilium.rawnet", "-o", folder / "lilium.glb"),
         *("--network", folder / "network.json", "--report", folder / "report.json"),
@@ -133,7 +147,7 @@ def test_a_noisy_scan_becomes_a_surface(shared_data: Path, tmp_path: Path, name:
 def test_standard_input_and_a_network_only(shared_data: Path, tmp_path: Path) -> None:
     text = (shared_data / "lilium.rawnet").read_text()
     output = ("-o", tmp_path / "no.glb", "--network", tmp_path / "network.json")
-    done = tracemesh("reconstruct", "-", *output, "--no-surface", stdin=text)
+    done = tracemesh_process("reconstruct", "-", *output, "--no-surface", stdin=text)
     assert done.returncode == 0, done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["network.json"]
 
@@ -144,7 +158,7 @@ def test_a_robust_loss_bears_frames_that_are_pure_chance(shared_data: Path, tmp_
     for k in rows[5::20]:
         lines[k] = f"{lines[k].split()[0]} 0.6 0.8 0 -0.8 0.6 0"
     output = ("-o", tmp_path / "no.glb", "--report", tmp_path / "report.json", "--no-surface", "--robust")
-    done = tracemesh("reconstruct", "-", *output, stdin="\n".join(lines))
+    done = tracemesh_process("reconstruct", "-", *output, stdin="\n".join(lines))
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "report.json").read_text())["network"]["parameters"]["robust"] is True
 
@@ -210,7 +224,7 @@ def test_usage_errors_exit_with_two(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    done = tracemesh("reconstruct", tmp_path / "none.rawnet", "-o", tmp_path / "m.glb")
+    done = tracemesh_process("reconstruct", tmp_path / "none.rawnet", "-o", tmp_path / "m.glb")
     assert done.returncode == 1
     assert "none.rawnet" in done.stderr
     assert "Traceback" not in done.stderr
