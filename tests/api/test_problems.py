@@ -94,6 +94,21 @@ def test_people_are_told_their_own_numbers(server: Any, session: str) -> None:
     assert [w in p.message for w, p in zip(wanted, problems(server, session), strict=True)] == [True, True]
 
 
+def test_what_fits_badly_is_shown_where_it_is(server: Any, session: str) -> None:
+    """Two nodes of a curve change their numbers, and the curve before it is gone: people know it by its own number."""
+    edit(server, session, 1, removed=True)
+    first, *between, last = marks(server, session, 2)
+    swapped = [first | {"node": last["node"]}, *between, last | {"node": first["node"]}]
+    edit(server, session, 2, marks=swapped)
+    warnings = [p for p in problems(server, session) if p.severity == "warning"]
+    assert warnings
+    (worst, *_) = warnings
+    assert worst.message.startswith(f"curve {worst.curves[0] + 1} misses its node by ")
+    ends = [mark["sample"] for mark in marks(server, session, worst.curves[0])]
+    assert worst.samples in itertools.pairwise(ends)
+    assert 2 in [curve for warning in warnings for curve in warning.curves]
+
+
 def test_nothing_scanned_is_a_problem_and_no_session_an_error(server: Any) -> None:
     (found,) = problems(server, server.new_session())
     assert "no curve with samples" in found.message

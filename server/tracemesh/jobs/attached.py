@@ -18,6 +18,7 @@ from tracemesh.storage.database import Database
 from tracemesh.storage.scans import load_sent
 
 if TYPE_CHECKING:
+    from tracemesh.geometry.curves.network_report import Misfit
     from tracemesh.geometry.curves.reconstruction import NetworkResult
 
 
@@ -38,6 +39,7 @@ class SolvedNetwork:
 
     curves: dict[int, SolvedCurve]
     nodes: dict[int, Floats]
+    misfits: "tuple[Misfit, ...]"
     report: dict[str, object]
     network: CurveNetwork
 
@@ -91,7 +93,7 @@ def solved_network(scan: Scan, begun: Scan, indices: Sequence[int], result: "Net
         for i, (index, curve, sent) in enumerate(zip(indices, begun.curves, scan.curves, strict=True))
     }
     nodes = {int(n): network.points[p] for n, p in zip(numbers, network.nodes, strict=False)}
-    return SolvedNetwork(curves, nodes, result.report, network)
+    return SolvedNetwork(curves, nodes, result.misfits, result.report, network)
 
 
 def _solved(network: CurveNetwork, index: int, curve: CurveScan, sent: CurveScan) -> SolvedCurve:

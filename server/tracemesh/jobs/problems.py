@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.scan import Floats, Scan
+from tracemesh.geometry.scan import Floats, Scan, curve_name
 from tracemesh.jobs.attached import SolvedNetwork, solve_network
 from tracemesh.wire.resources import Curve, CurveEdit, CurveUpdate, Fix, Mark, NetworkProblem
 
@@ -30,10 +30,8 @@ def find_problems(scan: Scan, curves: Sequence[Curve]) -> list[NetworkProblem]:
         solved = solve_network(scan, [curve.index for curve in curves])
     except ScanError as error:
         return [_of_error(error, curves)]
-    warnings = solved.report["warnings"]
-    assert isinstance(warnings, list)
     found = _Finder(solved, curves)
-    return [*found.problems(), *(NetworkProblem(message=str(w), severity="warning") for w in warnings)]
+    return [*found.problems(), *found.warnings()]
 
 
 def _of_error(error: ScanError, curves: Sequence[Curve]) -> NetworkProblem:
@@ -80,6 +78,12 @@ class _Finder:
             fix = self._fix(fault, faults, curve, ends[0])
             message = self._renamed(fault)
             yield NetworkProblem(message=message, severity="error", curves=[curve.index], samples=ends, fix=fix)
+
+    def warnings(self) -> Iterator[NetworkProblem]:
+        for misfit in self._solved.misfits:
+            curve, ends = self._curve(misfit.segment), self._samples(misfit.segment)
+            message = misfit.warning(curve_name(curve.index))
+            yield NetworkProblem(message=message, severity="warning", curves=[curve.index], samples=ends)
 
     def _fix(self, fault: "Fault", faults: "Sequence[Fault]", curve: Curve, sample: int) -> Fix | None:
         if fault.end is not None:

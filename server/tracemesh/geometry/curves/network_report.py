@@ -1,11 +1,12 @@
 """What a reconstruction tells about itself, in words and JSON-able numbers."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tracemesh.geometry.curves.closing import Closing
 from tracemesh.geometry.curves.samples import Layout
-from tracemesh.geometry.scan import curve_name
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -38,7 +39,27 @@ def bias_report(closing: Closing | None, indices: Ints) -> dict[str, object]:
     }
 
 
-def fit_warnings(layout: Layout, gaps: Floats, expected: Floats, indices: Ints) -> list[str]:
+@dataclass(frozen=True)
+class Misfit:
+    """A segment, by its place in the network, of the curve at an index of the scan, that misses its node.
+
+    gap, length: m, of the segment.
+    """
+
+    segment: int
+    curve: int
+    gap: float
+    length: float
+
+    def warning(self, curve: str) -> str:
+        """In words, where the curve has this name."""
+        return (
+            f"{curve} misses its node by {self.gap:.2g} m on a segment of {self.length:.2g} m, more than noise "
+            "explains: is a node number wrong, or is it smoothed too much?"
+        )
+
+
+def find_misfits(layout: Layout, gaps: Floats, expected: Floats, indices: Ints) -> tuple[Misfit, ...]:
     """The worst of the segments whose gaps (s, 3), m, random errors (s,), m, do not explain.
 
     Most likely a node has a wrong number, or a mark was set far from it.
@@ -46,9 +67,5 @@ def fit_warnings(layout: Layout, gaps: Floats, expected: Floats, indices: Ints) 
     gap = np.linalg.norm(gaps, axis=1)
     bad = np.flatnonzero((gap > _BAD_FIT * expected) & (gap > _WORTH_A_WARNING * layout.segment_lengths))
     worst = bad[np.argsort(-gap[bad] / expected[bad])][:_MOST]
-    return [
-        f"{curve_name(indices[layout.segment_curve[s]])} misses its node by {gap[s]:.2g} m on a segment of "
-        f"{layout.segment_lengths[s]:.2g} m, more than noise explains: "
-        "is a node number wrong, or is it smoothed too much?"
-        for s in worst
-    ]
+    curves = indices[layout.segment_curve]
+    return tuple(Misfit(int(s), int(curves[s]), float(gap[s]), float(layout.segment_lengths[s])) for s in worst)

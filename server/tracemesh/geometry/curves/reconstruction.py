@@ -13,7 +13,7 @@ from tracemesh.geometry.curves.assembly import assemble_network, per_point
 from tracemesh.geometry.curves.cleaning import CleanCurve, clean_curves
 from tracemesh.geometry.curves.closing import Closed, close_network
 from tracemesh.geometry.curves.energy import Weights
-from tracemesh.geometry.curves.network_report import bias_report, fit_warnings
+from tracemesh.geometry.curves.network_report import Misfit, bias_report, find_misfits
 from tracemesh.geometry.curves.placement import PlacedCurve, measured_layout, place_curve, uniform_layout
 from tracemesh.geometry.curves.polyline import MeasuredNetwork, measure_network, points_on_polyline
 from tracemesh.geometry.curves.positions import Positions, check_connected, solve_positions
@@ -61,12 +61,14 @@ class NetworkParameters:
 @dataclass(frozen=True)
 class NetworkResult:
     """network: the reconstruction. frames: (n, 3, 3) [t N B] at its points, a node's being of its first curve.
-    uncertainty: (n,) m, root mean square distance of each point from the truth. report: what was done, JSON-able.
+    uncertainty: (n,) m, root mean square distance of each point from the truth. misfits: what does not fit
+    together, worst first. report: what was done, JSON-able.
     """
 
     network: CurveNetwork
     frames: Floats
     uncertainty: Floats
+    misfits: tuple[Misfit, ...]
     report: dict[str, object]
 
 
@@ -143,8 +145,10 @@ class NetworkReconstruction:
         uncertainty = per_point(layout, self._uncertainty(layout, positions, regression.frames))
         network = assemble_network(layout, positions.points, regression.frames, uncertainty, self._indices)
         self._stages.end()
+        misfits = self._misfits(layout, positions)
         report = self._report(network, regression, positions, used, uncertainty)
-        return NetworkResult(network, per_point(layout, regression.frames), uncertainty, report)
+        report["warnings"] = [misfit.warning(curve_name(misfit.curve)) for misfit in misfits]
+        return NetworkResult(network, per_point(layout, regression.frames), uncertainty, misfits, report)
 
     def _uncertainty(self, layout: Layout, positions: Positions, frames: Floats) -> Floats:
         if self._closed is None:
@@ -159,10 +163,10 @@ class NetworkReconstruction:
         covariance = self._closed.closing.covariance(layout) if self._closed else None
         return solve_positions(layout, edge_vectors(layout, frames), covariance)
 
-    def _warnings(self, layout: Layout, positions: Positions) -> list[str]:
+    def _misfits(self, layout: Layout, positions: Positions) -> tuple[Misfit, ...]:
         if self._closed is None:
-            return []
-        return fit_warnings(layout, positions.gaps, self._closed.closing.expected_gaps(layout), self._indices)
+            return ()
+        return find_misfits(layout, positions.gaps, self._closed.closing.expected_gaps(layout), self._indices)
 
     def _report(
         self,
@@ -200,7 +204,6 @@ class NetworkReconstruction:
             "uncertainty": {"mean_m": float(uncertainty.mean()), "max_m": float(uncertainty.max())},
             "regression": {"energy": regression.energy, "iterations": regression.iterations},
             "seconds": dict(self._stages.seconds),
-            "warnings": self._warnings(layout, positions),
         }
 
 
