@@ -39,7 +39,7 @@ COLUMNS = (Column("what"), Column("budget"), Column("measured", ".1f"), Column("
 NOTES = (
     """Built pages in headless Chromium on the same machine, WebGL in software. First load: every script and style
     that a page needs at once, compressed with gzip. First view: from the address to the surface on the screen, of a
-    session whose live curves have so many points and whose surface has so many triangles; the median of five.
+    session with so many samples, as far apart drawn as an eye can tell, and triangles; the median of five.
     Slider: from its input event until the answer has come, and to the end of the first frame that shows the network
     so asked for, of a noisy leaf cut as finely as the slider allows; each move asks for something new, once the one
     before was seen; the first one is not counted. Script: what the browser reports as script time while messages
@@ -106,9 +106,11 @@ def _first_view(page: Page, address: str) -> tuple[Cell, ...]:
         page.wait_for_selector("canvas[data-surface=shown]")
         page.evaluate("() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
         waits.append(time.perf_counter() - begin)
+    samples = sum(len(curve.distance) for curve in large.curves)
     points = sum(len(c["positions"]) // 3 for c in _snapshot(address, session)["curves"])
     triangles = page.locator("canvas").get_attribute("data-triangles")
-    return (f"first view, {points} points and {triangles} triangles", "1500", 1000 * float(np.median(waits)), "ms")
+    what = f"first view, {samples} samples drawn as {points} points, {triangles} triangles"
+    return (what, "1500", 1000 * float(np.median(waits)), "ms")
 
 
 MOVE = """(slider, handle) => new Promise((seen) => {

@@ -1,5 +1,6 @@
 """No page has a fault that axe can find, in either theme."""
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -48,6 +49,53 @@ def test_pages_are_accessible(server: Server, page: Page, rider: Callable[[str],
     page.goto(server.page(f"scan.html#{session}"))
     expect(page.get_by_role("button", name="Use this device's sensors")).to_be_visible()
     assert _faults(page) == []
+
+
+STOPS = """() => {
+  const reachable = "a[href], button, input, select, summary, [tabindex='0']";
+  const seen = [...document.querySelectorAll(reachable)].filter((e) => !e.disabled && e.checkVisibility());
+  const own = (e) => (e.type === "radio" ? e.name : e);
+  return new Set(seen.map(own)).size;
+}"""
+"""Counts what the keyboard should reach; of radio buttons that exclude each other one."""
+FOCUSED = """() => {
+  const e = document.activeElement;
+  if (e === document.body) return undefined;
+  const { x, y, width, height } = e.getBoundingClientRect();
+  const part = ["header", ".left", "main", ".right"].findIndex((area) => e.closest(area));
+  const outlined = getComputedStyle(e).outlineStyle !== "none" && e.matches(":focus-visible");
+  return { part, middle: [x + width / 2, y + height / 2], label: e.ariaLabel ?? e.textContent.trim(), outlined };
+}"""
+
+
+def test_the_keyboard_reaches_everything_in_reading_order(server: Server, page: Page, rider: Callable) -> None:
+    session = server.call("POST", "/sessions", {"name": "Leaf, by key"})["id"]
+    rider(session).ride(lambda m: False)
+    server.call("POST", f"/sessions/{session}/reconstructions", {})
+    page.goto(server.page(f"#/sessions/{session}"))
+    expect(page.locator("canvas").first).to_have_attribute("data-surface", "shown")
+    expect(page.get_by_role("button", name="5 interior")).to_be_visible()
+    reached = []
+    while page.keyboard.press("Tab") or (at := page.evaluate(FOCUSED)):
+        reached.append(at)
+    assert len(reached) == page.evaluate(STOPS)
+    assert [at["label"] for at in reached if not at["outlined"]] == []
+    parts = [at["part"] for at in reached]
+    assert parts == sorted(parts)
+    assert set(parts) == {0, 1, 2, 3}
+    for before, at in itertools.pairwise(reached):
+        lower, right = at["middle"][1] > before["middle"][1] - 8, at["middle"][0] > before["middle"][0]
+        assert at["part"] != before["part"] or lower or right, f"from {before['label']} back to {at['label']}"
+
+    opener = page.get_by_role("button", name="Keyboard shortcuts")
+    opener.focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    for _ in range(3):
+        page.keyboard.press("Tab")
+        assert page.evaluate("() => !document.activeElement.closest('header, main, aside')")
+    page.keyboard.press("Escape")
+    expect(opener).to_be_focused()
 
 
 def _faults(page: Page) -> list[str]:

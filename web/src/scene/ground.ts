@@ -34,6 +34,7 @@ export class Ground {
     transparent: true,
     depthWrite: false,
     side: DoubleSide,
+    forceSinglePass: true,
     uniforms: {
       color: { value: null },
       centre: { value: new Vector3() },

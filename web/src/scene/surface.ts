@@ -58,7 +58,7 @@ export class SurfaceLayer {
       vertexShader,
       fragmentShader: fragment(look),
       side: DoubleSide,
-      transparent: true,
+      forceSinglePass: true,
       polygonOffset: true,
       polygonOffsetFactor: 2,
       polygonOffsetUnits: 8,
@@ -90,6 +90,7 @@ export class SurfaceLayer {
   /** 0 is not there, 1 is solid. */
   set opacity(value: number) {
     this.#uniform("opacity").value = value;
+    this.object.material.transparent = value < 1;
     this.object.material.depthWrite = value > 0.5;
   }
 

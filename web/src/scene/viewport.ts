@@ -195,8 +195,8 @@ export class Viewport {
   #draw(now: number): void {
     const seconds = Math.min((now - this.#last) / 1000, 0.05);
     this.#last = now;
-    this.#frame = 0;
     const moving = this.#step(seconds);
+    this.#frame = 0; // not before: what the step itself moved is in this frame
     this.#renderer.render(this.#scene, this.rig.camera);
     this.events.drawn();
     if (moving) this.invalidate();
@@ -225,6 +225,7 @@ export class Viewport {
 
   #resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (this.#renderer.getSize(new Vector2()).equals({ x: width, y: height })) return;
     this.#renderer.setSize(width, height, false);
     this.rig.resize(width, height);
     this.invalidate();

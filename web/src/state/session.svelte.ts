@@ -238,9 +238,10 @@ export class SessionStore {
       if (message.reconstruction) this.#progressed(message.reconstruction);
     }
     if (message.type === "live.curve.start" || message.type === "live.points") this.#outdate();
+    this.#listSoon();
+    if (this.network !== this.live) return;
     if (change === "replaced") this.replacements += 1;
     this.revision += 1;
-    this.#listSoon();
   }
 
   #progressed(reconstruction: Reconstruction): void {
