@@ -22,6 +22,8 @@ from tests.api.conftest import free_port
 from tracemesh.api.lan import authority
 from tracemesh.api.lan.addresses import addresses, host_names, main_address
 from tracemesh.api.lan.authority import Authority
+from tracemesh.doctor import check_port
+from tracemesh.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,12 @@ def test_plain_http_gives_the_certificate_away_with_help(lan: LanServer) -> None
     fingerprint = re.findall(r"SHA-256  (\S+)", lan.said)[0]
     assert fingerprint in page
     assert all(system in page for system in ("iPhone", "Android", "Windows", "macOS", "Linux"))
+
+
+def test_the_doctor_knows_the_server(lan: LanServer, tmp_path: Path) -> None:
+    port = int(lan.port("https"))
+    told = check_port(Settings(data_dir=tmp_path, port=port))
+    assert (told.what, told.advice) == (f"a server answers at 127.0.0.1:{port}", "")
 
 
 def test_a_certificate_lasts_from_start_to_start_and_keys_are_nobody_elses(tmp_path: Path) -> None:

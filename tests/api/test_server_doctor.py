@@ -3,7 +3,9 @@
 import http.server
 import os
 import shutil
+import socket
 import threading
+from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,7 @@ def complaints(**options: Any) -> list[str]:
     return [finding.what for finding in examine(Settings(**options)) if finding.advice]
 
 
-def test_a_sound_server_gets_a_clean_bill_and_an_empty_folder_stays_empty(
+def test_a_sound_server_gets_a_clean_bill_and_a_missing_folder_stays_missing(
     server_process: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     server_process.start()
@@ -33,8 +35,8 @@ def test_a_sound_server_gets_a_clean_bill_and_an_empty_folder_stays_empty(
     told = capsys.readouterr().out
     assert "!!" not in told
     assert "a server answers" in told
-    assert complaints(data_dir=tmp_path / "new", port=1) == []
-    assert list((tmp_path / "new").iterdir()) == []
+    assert complaints(data_dir=tmp_path / "new" / "one", port=1) == []
+    assert not (tmp_path / "new").exists()
 
 
 def test_each_fault_of_database_and_artifacts_is_named(database_url: str, tmp_path: Path) -> None:
@@ -82,6 +84,38 @@ def test_a_stranger_at_the_port_is_named(tmp_path: Path) -> None:
         (told,) = complaints(data_dir=tmp_path, port=stranger.server_address[1])
         thread.join()
     assert told.startswith("something else than tracemesh listens")
+
+
+def test_a_scheduler_that_is_away_is_named(tmp_path: Path) -> None:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port = listener.getsockname()[1]
+        (away,) = complaints(data_dir=tmp_path, port=1, executor=f"dask://127.0.0.1:{port}")
+        listener.listen()
+        assert complaints(data_dir=tmp_path, port=1, executor=f"dask://127.0.0.1:{port}") == []
+    assert away.startswith(f"no dask scheduler at 127.0.0.1:{port}")
+
+
+def test_a_clock_that_was_set_back_is_named(database_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    options = {"database_url": database_url, "data_dir": tmp_path, "port": 1}
+    database = Database(database_url)
+    database.migrate()
+    with database.write() as transaction:
+        create_session(transaction, SessionCreate(id="s"))
+    database.close()
+    assert complaints(**options) == []
+
+    class Behind(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> "Behind":
+            return super().now(tz) - timedelta(minutes=1)
+
+    monkeypatch.setattr("tracemesh.doctor.datetime", Behind)
+    (told,) = complaints(**options)
+    wanted = (
+        "and that of postgresql are 60 s apart" if database_url.startswith("postgresql") else "60 s before the newest"
+    )
+    assert wanted in told
 
 
 def test_a_bucket_that_is_away_is_named(s3: Any, tmp_path: Path) -> None:

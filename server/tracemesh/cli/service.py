@@ -51,7 +51,8 @@ def add_doctor(commands: Commands) -> None:
     parser = commands.add_parser(
         "doctor",
         help="tell what is wrong with a server",
-        description="Look at data folder, database, results, web page and port, and say in plain words what to mend.",
+        description="Look at data folder, database, clock, results, executor, web page and port, and say in plain "
+        "words what to mend.",
     )
     parser.add_argument("--host", help="address of the server (default 127.0.0.1)")
     parser.add_argument("--port", type=port, help="port of the server (default 8000)")
