@@ -33,9 +33,12 @@ COLUMNS = (
 )
 
 
-def meshes(data: Data, names: tuple[str, ...] = tuple(SHAPES)) -> Table:
-    """Table of every network and scan of the folder, and of built-in shapes by name, by default settings."""
-    rows = tuple(_row(*one) for one in _networks(data, names))
+def meshes(data: Data, names: tuple[str, ...] = tuple(SHAPES), with_networks: bool = True) -> Table:
+    """Table of every network and scan of the folder, and of built-in shapes by name, by default settings.
+
+    with_networks: False takes the folder's scans alone.
+    """
+    rows = tuple(_row(*one) for one in _networks(data, names, with_networks))
     note = f"""Default settings. Manifold: no edge with more than two triangles, no vertex unused. Oriented: neighbours
         run along their common edge in opposite directions. Turned over: triangles that look more than 90 degrees away
         from the normals propagated to their corners. In order: all of it right and no angle below
@@ -43,11 +46,11 @@ def meshes(data: Data, names: tuple[str, ...] = tuple(SHAPES)) -> Table:
     return Table("meshes", "Meshes of every network and scan", COLUMNS, rows, (note,))
 
 
-def _networks(data: Data, names: tuple[str, ...]) -> Iterator[tuple[str, CurveNetwork, int]]:
+def _networks(data: Data, names: tuple[str, ...], with_networks: bool) -> Iterator[tuple[str, CurveNetwork, int]]:
     """Names, networks and true Euler numbers."""
     for name in names:
         yield f"{name} (built in)", built_in(name).network(0.02), BUILT_IN.get(name, 1)
-    for name, network in data.networks():
+    for name, network in data.networks() if with_networks else ():
         yield name, network, CLOSED.get(name.split("-")[0], 1)
     for kind in ("exact", "noisy"):
         for known in data.scans(kind):

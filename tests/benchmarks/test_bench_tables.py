@@ -167,9 +167,10 @@ def test_growth_fits_and_leaves_out_what_takes_too_long() -> None:
     assert [row[2] for row in none.rows[:1]] == ["over 0 s"]
 
 
-def test_meshes_of_all_networks_and_scans_are_in_order(shared_data: Path) -> None:
-    rows = meshes.meshes(Data(shared_data)).rows
-    assert len(rows) >= 5 + 10 + 12 + 1
+def test_meshes_of_all_shapes_and_scans_are_in_order(shared_data: Path) -> None:
+    """Those of the folder's networks have a test of their own beside the truth, test_surface.py."""
+    rows = meshes.meshes(Data(shared_data), with_networks=False).rows
+    assert len(rows) >= 5 + 12 + 1
     assert [row for row in rows if row[-1] != "yes"] == []
 
 

@@ -8,7 +8,7 @@ from tracemesh.geometry.comparison.closest import ClosestPoints
 from tracemesh.geometry.comparison.registration import register
 from tracemesh.geometry.simulated.shapes import SHAPES, leaf
 
-VERTICES, FACES = leaf().mesh(32)
+VERTICES, FACES = leaf().mesh(16)
 
 
 def on_surface(count: int) -> np.ndarray:

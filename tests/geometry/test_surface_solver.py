@@ -12,6 +12,7 @@ from tracemesh.formats.networks import read_network
 from tracemesh.geometry.comparison.closest import ClosestPoints
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats
+from tracemesh.geometry.surfaces.subdivision import thinned
 from tracemesh.geometry.surfaces.surface import SurfaceParameters, span_surface
 from tracemesh.geometry.surfaces.surface_solver import SurfaceSolver
 
@@ -19,26 +20,35 @@ DIAGONAL = np.sqrt(304)
 
 
 @pytest.fixture(scope="module")
-def torus(shared_data: Path) -> CurveNetwork:
+def fine_torus(shared_data: Path) -> CurveNetwork:
     return read_network((shared_data / "networks/torus-9.network.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def torus(fine_torus: CurveNetwork) -> CurveNetwork:
+    """Every second point: a quarter of the mesh."""
+    return thinned(fine_torus, 2)
 
 
 def torus_distance(points: Floats) -> Floats:
     return np.asarray(np.hypot(np.hypot(points[:, 0], points[:, 1]) - 4, points[:, 2]) - 2)
 
 
-def assert_same_surface(one: Mesh, other: Mesh) -> None:
-    """Patches may be meshed differently: vertices of one lie on triangles of the other up to the height of a chord."""
+def assert_same_surface(one: Mesh, other: Mesh, chord: float = 2.5e-3) -> None:
+    """Patches may be meshed differently: vertices of one lie on triangles of the other up to the height of a chord,
+    told as a share of the diagonal.
+    """
     distance = ClosestPoints(other.vertices, other.faces)(one.vertices)[1]
-    assert distance.max() < 8e-4 * DIAGONAL
-    assert distance.mean() < 1e-5 * DIAGONAL
+    assert distance.max() < chord * DIAGONAL
+    assert distance.mean() < chord / 80 * DIAGONAL
 
 
 def bent(network: CurveNetwork, segment: int = 5) -> CurveNetwork:
     """One segment pushed out of the surface in the middle."""
     inner = network.segments[segment].points[1:-1]
     points = network.points.copy()
-    points[inner] += 0.02 * np.sin(np.linspace(0, np.pi, len(inner)))[:, None] * network.normals[inner]
+    height = 0.02 * np.sin(np.linspace(0, np.pi, len(inner) + 2))[1:-1, None]
+    points[inner] += height * network.normals[inner]
     return replace(network, points=points)
 
 
@@ -67,12 +77,12 @@ def test_local_solution_equals_the_full_one(
     assert_same_surface(local.mesh, full.mesh)
 
 
-def test_added_curve_is_solved_like_the_full_network(torus: CurveNetwork) -> None:
+def test_added_curve_is_solved_like_the_full_network(fine_torus: CurveNetwork) -> None:
     solver = SurfaceSolver()
-    solver.span(without_segment(torus, 5))
-    local, full = solver.span(torus), span_surface(torus)
+    solver.span(without_segment(fine_torus, 5))
+    local, full = solver.span(fine_torus), span_surface(fine_torus)
     assert local.report["resolved_patches"] < 16  # type: ignore[operator]
-    assert_same_surface(local.mesh, full.mesh)
+    assert_same_surface(local.mesh, full.mesh, chord=8e-4)
     assert abs(torus_distance(local.mesh.vertices)).mean() < 1.1 * abs(torus_distance(full.mesh.vertices)).mean()
 
 
