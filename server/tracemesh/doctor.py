@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import HTTPSHandler, ProxyHandler, build_opener
 
-from sqlalchemy import func, select, text
+from sqlalchemy import func, make_url, select, text
 from sqlalchemy.exc import SQLAlchemyError
 
 from tracemesh.api.routes.pages import WEB
@@ -73,16 +73,17 @@ def check_folder(settings: Settings) -> Finding:
 
 def check_database(settings: Settings) -> Iterator[Finding]:
     """Whether the database answers, is whole and is of this version; and the artifacts that it names are there."""
+    parsed = make_url(settings.resolved_database_url)
+    if parsed.get_backend_name() == "sqlite" and not Path(str(parsed.database)).is_file():
+        yield Finding(f"no database yet; the first tracemesh serve makes {parsed.database}")
+        return
     try:
         database = Database(settings.resolved_database_url)
     except ResourceError as error:
         yield Finding(str(error), "install it, or unset TRACEMESH_DATABASE_URL to use SQLite")
         return
-    kind, file = database.engine.dialect.name, database.engine.url.database
+    kind = database.engine.dialect.name
     try:
-        if kind == "sqlite" and not Path(str(file)).is_file():
-            yield Finding(f"no database yet; the first tracemesh serve makes {file}")
-            return
         present, wanted = database.versions()
         yield _version(kind, present, wanted)
         if kind == "sqlite":
@@ -138,7 +139,7 @@ def _is_ours(url: str) -> bool:
         return False
 
 
-def _version(kind: str, present: str | None, wanted: str | None) -> Finding:
+def _version(kind: str, present: str | None, wanted: str) -> Finding:
     if present == wanted or present is None:
         return Finding(f"{kind}, {'still empty' if present is None else f'schema {present}'}")
     advice = "tracemesh serve brings an older one up to date; of a newer one, use the newer tracemesh"

@@ -12,7 +12,7 @@ import pytest
 from alembic.script import ScriptDirectory
 from sqlalchemy import Column, Connection, MetaData, event, select
 
-from tracemesh.storage.database import Database, migrations
+from tracemesh.storage.database import Database, migrations, newest_revision
 from tracemesh.storage.devices import list_devices
 from tracemesh.storage.models import SessionRow
 
@@ -38,6 +38,10 @@ database.migrate()
 """Migrates a database and kills itself before a certain statement."""
 
 Rows = dict[str, dict[str, Any]]
+
+
+def test_the_newest_revision_is_alembics_head() -> None:
+    assert newest_revision() == ScriptDirectory.from_config(migrations()).get_current_head()
 
 
 def value(column: Column[Any], rows: Rows) -> Any:

@@ -1,14 +1,15 @@
-"""The database: one engine, short transactions, one schema kept by migrations."""
+"""The database: one engine, short transactions, one schema kept by migrations.
+
+Alembic is imported where it has something to do: most starts find the schema as it should be, and are sooner without.
+"""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import Engine, create_engine, event
+from sqlalchemy import Engine, create_engine, event, inspect
 from sqlalchemy.engine import Connection, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import SQLAlchemyError
@@ -17,6 +18,9 @@ from sqlalchemy.pool import ConnectionPoolEntry
 
 from tracemesh.errors import ResourceError
 from tracemesh.storage.postgresql import postgresql_engine
+
+if TYPE_CHECKING:
+    from alembic.config import Config
 
 MAX_WAL_PAGES = 16_384
 """Pages (of 4 KiB) of SQLite's log at which a writer begins it anew; by then nearly all are in the main file."""
@@ -61,20 +65,26 @@ class Database:
         """Close all connections."""
         self.engine.dispose()
 
-    def migrate(self, revision: str = "head") -> None:
-        """Bring the schema up to this revision: wholly or, when it fails, not at all."""
+    def migrate(self, revision: str | None = None) -> None:
+        """Bring the schema up to this revision, or the newest: wholly or, when it fails, not at all."""
+        present, newest = self.versions()
+        if present == (revision or newest):
+            return
+        from alembic import command
+
         with self.engine.connect().execution_options(writes=True) as connection, connection.begin():
             if connection.dialect.name == "postgresql":
                 connection.exec_driver_sql("SELECT pg_advisory_xact_lock(7262726564)")
             config = migrations()
             config.attributes["connection"] = connection
-            command.upgrade(config, revision)
+            command.upgrade(config, revision or newest)
 
-    def versions(self) -> tuple[str | None, str | None]:
+    def versions(self) -> tuple[str | None, str]:
         """The schema's version, none in an empty database, and the one that this program wants."""
         with self.engine.connect() as connection:
-            present = MigrationContext.configure(connection).get_current_revision()
-        return present, ScriptDirectory.from_config(migrations()).get_current_head()
+            there = inspect(connection).has_table("alembic_version")
+            present = connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalar() if there else None
+        return present, newest_revision()
 
 
 @contextmanager
@@ -91,8 +101,16 @@ def fault_in_words(error: SQLAlchemyError) -> str:
     return str(getattr(error, "orig", None) or error).splitlines()[0]
 
 
-def migrations() -> Config:
+def newest_revision() -> str:
+    """Of the schema: each of its migrations is in a file whose name begins with its number."""
+    folder = files("tracemesh.storage.migrations.versions")
+    return max(file.name.partition("_")[0] for file in folder.iterdir() if file.name[0].isdigit())
+
+
+def migrations() -> "Config":
     """Where alembic finds the schema's history."""
+    from alembic.config import Config
+
     config = Config()
     config.set_main_option("script_location", "tracemesh.storage:migrations")
     return config
