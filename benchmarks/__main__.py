@@ -46,6 +46,7 @@ TABLES: dict[str, Callable[[Data], Table]] = {
     "growth": growth.growth,
     "ingest": ingest.ingest,
     "browsing": browsing.browsing,
+    "starts": service.starts,
     "requests": service.requests,
     "jobs": service.jobs,
     "costs": service.costs,

@@ -1,6 +1,10 @@
-"""docs/benchmarks.json and docs/benchmarks.md: the tables of the last run, with the machine at the head."""
+"""docs/benchmarks.json and docs/benchmarks.md: the tables of the last run, with the machine at the head.
+
+Other pages quote tables between `<!-- measured: NAME -->` and `<!-- end -->`.
+"""
 
 import json
+import re
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict
 
@@ -22,6 +26,7 @@ class Report(TypedDict):
     tables: dict[str, Record]
 
 
+QUOTE = re.compile(r"(?<=<!-- measured: )(\w+)( -->\n).*?(?=<!-- end -->)", re.DOTALL)
 HEAD = """# Benchmarks
 
 Written by `make bench` (`python -m benchmarks`; with the names of tables it measures these alone and keeps the others);
@@ -46,13 +51,30 @@ def read_report(path: Path, machine: dict[str, object]) -> Report:
 
 
 def write_report(folder: Path, report: Report, order: list[str]) -> None:
-    """Write both files; tables in the given order."""
+    """Write both files, tables in the given order, and the pages that quote them."""
     tables = {name: report["tables"][name] for name in order if name in report["tables"]}
     report = Report(machine=report["machine"], tables=tables)
     (folder / "benchmarks.json").write_text(json.dumps(report, indent=1) + "\n")
     (folder / "benchmarks.md").write_text(
         "\n".join([HEAD, _machine(report["machine"]), *map(_section, tables.values())])
     )
+    for page in folder.glob("*.md"):
+        text = page.read_text()
+        if (quoted := with_quotes(text, tables)) != text:
+            page.write_text(quoted)
+
+
+def with_quotes(page: str, tables: dict[str, Record]) -> str:
+    """The text of a page with every table that it quotes as it was measured last."""
+    return QUOTE.sub(lambda found: f"{found[1]}{found[2]}{_quoted(found, tables)}", page)
+
+
+def _quoted(found: re.Match[str], tables: dict[str, Record]) -> str:
+    name, text = found[1], found[0]
+    if name not in tables:
+        return text.removeprefix(f"{name}{found[2]}")
+    _, body = Table.read(tables[name]["table"]).markdown().split("\n", 1)
+    return f"\n{body.strip()}\n\n"
 
 
 def _machine(machine: dict[str, object]) -> str:

@@ -33,18 +33,26 @@ class Serving:
 @contextmanager
 def serving(**settings: str | int) -> Iterator[Serving]:
     """A server of its own data, with these settings, until the end of the block."""
-    with tempfile.TemporaryDirectory() as folder:
-        port = free_port()
-        command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", folder]
-        environment = {f"TRACEMESH_{name.upper()}": str(value) for name, value in settings.items()}
-        begin = time.perf_counter()
-        process = subprocess.Popen(command, stderr=subprocess.DEVNULL, env={**os.environ, **environment})
-        try:
-            wait_for_server(port)
-            yield Serving(process, port, Path(folder), time.perf_counter() - begin)
-        finally:
-            process.terminate()
-            process.wait()
+    with tempfile.TemporaryDirectory() as folder, serving_from(Path(folder), **settings) as server:
+        yield server
+
+
+@contextmanager
+def serving_from(folder: Path, **settings: str | int) -> Iterator[Serving]:
+    """A server of the data in a folder, new or known. Python keeps what it compiles, as in an installed package."""
+    port = free_port()
+    command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", str(folder)]
+    environment = {f"TRACEMESH_{name.upper()}": str(value) for name, value in settings.items()}
+    begin = time.perf_counter()
+    process = subprocess.Popen(
+        command, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "", **environment}
+    )
+    try:
+        wait_for_server(port)
+        yield Serving(process, port, folder, time.perf_counter() - begin)
+    finally:
+        process.terminate()
+        process.wait()
 
 
 @contextmanager
