@@ -15,7 +15,7 @@ class Metrics:
         """Everything at zero."""
         own = self.registry = CollectorRegistry()
         self.messages = Counter("tracemesh_messages", "Messages of devices committed", registry=own)
-        self.bytes = Counter("tracemesh_message_bytes", "Bytes of messages accepted", registry=own)
+        self.bytes = Counter("tracemesh_message_bytes", "Bytes of messages committed", registry=own)
         self.refusals = Counter("tracemesh_refusals", "Devices refused, by the protocol's code", ["code"], registry=own)
         self.commits = Histogram(
             "tracemesh_commit_seconds", "Until a group of messages is durable", registry=own, buckets=COMMIT_BUCKETS

@@ -135,7 +135,6 @@ class Recorder:
             self._check_size(state, len(payload))
             state.advance(message, len(payload))
             self._batch.group.add(state, message, payload)
-            self._metrics.bytes.inc(len(payload))
             self._observer(state, message)
         self._wake.set()
 
@@ -202,6 +201,7 @@ class Recorder:
             self._fail_all()
             return
         self._metrics.messages.inc(len(group.messages))
+        self._metrics.bytes.inc(sum(len(row["payload"]) for row in group.messages))
         for key, row in group.reached.items():
             if key in self._open:
                 state, sender = self._open[key]

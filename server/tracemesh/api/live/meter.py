@@ -25,7 +25,7 @@ class Meter:
         self.is_here = is_here
         self._hello = hello
         self._began = self._last = monotonic()
-        self._arrivals: deque[tuple[float, int]] = deque(maxlen=1000)
+        self._arrivals: deque[tuple[float, int]] = deque()
         self._block: Samples | ArrayReading | None = None
         self.connected = True
 
@@ -33,13 +33,19 @@ class Meter:
         """A block of samples, or one reading of an array, arrived now."""
         self._last = monotonic()
         self._arrivals.append((self._last, block.count if isinstance(block, Samples) else 1))
+        self._forget(self._last - WINDOW)
         self._block = block
+
+    def _forget(self, before: float) -> None:
+        while self._arrivals and self._arrivals[0][0] <= before:
+            self._arrivals.popleft()
 
     def read(self) -> LiveDevice:
         """Health now."""
         now = monotonic()
         age = now - self._last
-        recent = sum(count for time, count in self._arrivals if time > now - WINDOW)
+        self._forget(now - WINDOW)
+        recent = sum(count for _, count in self._arrivals)
         acceleration, magnetic = self._vectors()
         return LiveDevice(
             recording=self._hello.recording,

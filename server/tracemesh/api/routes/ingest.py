@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from functools import partial
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
@@ -10,6 +11,7 @@ from tracemesh.api.access.roles import Principal
 from tracemesh.api.pace import Pace
 from tracemesh.api.services import Services, UsePrincipal, UseServices
 from tracemesh.api.sockets import first_to_end
+from tracemesh.api.websocket import SteadyReading, line
 from tracemesh.errors import Refused
 from tracemesh.storage.devices import proposal
 from tracemesh.storage.exchange import News
@@ -50,14 +52,18 @@ class _Connection:
         self._services = services
         self._principal = principal
         self._state: RecordingState | None = None
+        self._line: SteadyReading | None = None
+        self._pace = Pace(services.settings.max_device_rate)
+        self._pause = 0.0
         self._acknowledged: int | None = None
         self.failure: Refused | None = None
         """Why the recorder gave this connection up; what is read after that fails for no reason of its own."""
         self._wake = asyncio.Event()
 
     def acknowledge(self, seq: int) -> None:
-        self._acknowledged = seq
-        self._wake.set()
+        if self._line is None or not self._line.send_now(f'{{"type":"ack","seq":{seq}}}'):
+            self._acknowledged = seq
+            self._wake.set()
 
     def fail(self, reason: Refused) -> None:
         self.failure = reason
@@ -117,18 +123,35 @@ class _Connection:
                 self._services.edited(self._state.session.id)
 
     async def _read(self, state: RecordingState) -> None:
-        recorder = self._services.recorder
-        pace = Pace(self._services.settings.max_device_rate)
+        """Most messages are taken as they come; those that come while the device has to wait are taken here."""
+        self._line = line(self._socket.scope)
+        self._line.listen(partial(self._take_at_once, state))
         while True:
             payload = await self._receive()
-            message = _parsed(payload)
-            if isinstance(message, Hello):
-                raise Refused("malformed", "wanted one hello, got a second one")
-            recorder.accept(state, message, payload)
-            if state.next_seq - state.committed > MAX_UNACKNOWLEDGED:
-                await recorder.flush()
-            if (pause := pace.take(len(payload))) > SHORTEST_PAUSE:
-                await asyncio.sleep(pause)
+            if self._is_far_ahead(state):
+                await self._services.recorder.flush()
+            if self._pause > SHORTEST_PAUSE:
+                await asyncio.sleep(self._pause)
+            self._take(state, payload)
+
+    def _take_at_once(self, state: RecordingState, payload: bytes) -> bool:
+        """Whether the next message may be taken at once, too."""
+        try:
+            self._take(state, payload)
+        except Refused as reason:
+            self.fail(self.failure or reason)
+        return self.failure is None and self._pause <= SHORTEST_PAUSE and not self._is_far_ahead(state)
+
+    def _take(self, state: RecordingState, payload: bytes) -> None:
+        message = _parsed(payload)
+        if isinstance(message, Hello):
+            raise Refused("malformed", "wanted one hello, got a second one")
+        self._services.recorder.accept(state, message, payload)
+        self._pause = self._pace.take(len(payload))
+
+    @staticmethod
+    def _is_far_ahead(state: RecordingState) -> bool:
+        return state.next_seq - state.committed > MAX_UNACKNOWLEDGED
 
     async def _answer(self) -> None:
         while self.failure is None:
