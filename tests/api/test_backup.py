@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from tracemesh.errors import ResourceError
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import ArtifactStore
 from tracemesh.storage.backup import DUMP, back_up
@@ -98,11 +100,16 @@ def test_a_damaged_artifact_is_named(database_url: str, tmp_path: Path) -> None:
         assert made.database.read_bytes().startswith(b"PGDMP")
 
 
-@pytest.mark.parametrize("where", ["nothing", "data"])
-def test_what_cannot_be_backed_up_is_said(where: str, tmp_path: Path) -> None:
-    if where == "data":
-        Database(f"sqlite:///{tmp_path / 'data' / 'tracemesh.db'}").migrate()
-    done = run("backup", tmp_path / "data", "--data-dir", tmp_path / where)
-    assert done.returncode == 1
-    assert done.stderr.startswith("tracemesh: ")
-    assert done.stderr.count("\n") == 1
+@pytest.mark.parametrize(
+    ("folder", "where", "says"),
+    [
+        ("copy", "nothing", "there is no server's database"),
+        ("data", "data", "wanted another folder than the data folder"),
+        ("/proc/nowhere", "data", "the folder /proc/nowhere cannot be made: "),
+    ],
+)
+def test_what_cannot_be_backed_up_is_said(folder: str, where: str, says: str, tmp_path: Path) -> None:
+    Database(f"sqlite:///{tmp_path / 'data' / 'tracemesh.db'}").migrate()
+    settings = Settings(data_dir=tmp_path / where)
+    with pytest.raises(ResourceError, match=re.escape(says)):
+        back_up(settings, tmp_path / folder, lambda stage, fraction: None)

@@ -2,6 +2,7 @@
 
 import os
 import re
+import socket
 import subprocess
 import sys
 import time
@@ -38,6 +39,25 @@ def test_it_ends_with_a_line_that_says_why(
     assert done.returncode in (1, 2)
     assert says in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_an_address_that_is_taken_is_named_before_anything_starts(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        command = [
+            sys.executable,
+            "-m",
+            "tracemesh",
+            "serve",
+            "--port",
+            str(port),
+            "--data-dir",
+            str(tmp_path / "data"),
+        ]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"tracemesh: cannot listen at 127.0.0.1:{port}: Address already in use")
+    assert (done.returncode, (tmp_path / "data").exists()) == (1, False)
 
 
 def test_the_first_start_off_loopback_prints_the_owners_link_and_never_again(

@@ -1,8 +1,11 @@
 """Runs the service in one process."""
 
 import asyncio
+import errno
 import gc
 import socket
+from contextlib import suppress
+from ipaddress import ip_address
 from typing import TYPE_CHECKING
 
 import uvicorn
@@ -36,6 +39,7 @@ def serve(settings: Settings) -> None:
     Raises ResourceError when the data folder, the database or the address cannot be used.
     """
     logs.set_up(settings.log_format)
+    _check_address(settings.listen_host, settings.port)
     _prepare(settings)
     _collect_garbage_seldom()
     lan = _lan(settings) if settings.lan else None
@@ -99,6 +103,19 @@ class _Server(uvicorn.Server):
         if self._lan is not None and context is not None:
             plain = await asyncio.to_thread(self._lan.open, context, port)
             greet_phones(self._lan.authority, plain)
+
+
+def _check_address(host: str, port: int) -> None:
+    """Say what keeps us from an address before anything starts; what a name means is left to uvicorn."""
+    with suppress(ValueError):
+        family = socket.AF_INET6 if ip_address(host).version == 6 else socket.AF_INET
+        with socket.socket(family) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, port))
+            except OSError as error:
+                advice = "; another --port, or 0 for a free one?" if error.errno == errno.EADDRINUSE else ""
+                raise ResourceError(f"cannot listen at {host}:{port}: {error.strerror}{advice}") from None
 
 
 def _prepare(settings: Settings) -> None:

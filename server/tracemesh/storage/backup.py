@@ -41,7 +41,10 @@ def back_up(settings: Settings, folder: Path, progress: Callable[[str, float], N
         raise ResourceError(f"there is no server's database {url.database}")
     if folder.resolve() == settings.data_dir.resolve():
         raise ResourceError(f"wanted another folder than the data folder {settings.data_dir}")
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResourceError(f"the folder {folder} cannot be made: {error.strerror}") from None
     kept = ArtifactStore(folder / settings.artifact_dir.name)
     progress("database", 0.0)
     with database_faults_in_words(), closing(Database(settings.resolved_database_url)) as database:
