@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tracemesh.geometry.vectors import lengths
+
 Floats = NDArray[np.float64]
 
 _SMALL = 1e-4  # rad; below it the Taylor series of the coefficients is exact to rounding
@@ -80,12 +82,6 @@ def align_signs(quaternion: Floats) -> Floats:
     flips = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
     sign = np.concatenate([[1.0], np.where(np.cumsum(flips) % 2, -1.0, 1.0)])
     result: Floats = quaternion * sign[:, None]
-    return result
-
-
-def lengths(vector: Floats) -> Floats:
-    """Euclidean lengths (...) of vectors (..., n)."""
-    result: Floats = np.sqrt(np.einsum("...i,...i->...", vector, vector))
     return result
 
 

@@ -60,12 +60,14 @@ class _Estimation:
         self._rotation = np.eye(3) * _FIRST_ROTATION**2
         self._scale, self._shift, self._unit = _FIRST_SCALE**2, shift**2, shift
         self._noise = [1.0, 1.0]
+        self._own = 3 * np.arange(curves)[:, None] + np.arange(3)
 
     def _prior(self) -> Floats:
-        c, m = self._c, self._m
-        precision = np.diag(np.concatenate([np.zeros(3 * c), np.full(c, 1 / self._scale), np.full(m, 1 / self._shift)]))
-        own = 3 * np.arange(c)[:, None] + np.arange(3)
-        precision[own[:, :, None], own[:, None, :]] = np.linalg.inv(self._rotation)
+        c, size = self._c, 4 * self._c + self._m
+        precision = np.zeros((size, size))
+        diagonal = precision.reshape(-1)[:: size + 1]
+        diagonal[3 * c : 4 * c], diagonal[4 * c :] = 1 / self._scale, 1 / self._shift
+        precision[self._own[:, :, None], self._own[:, None, :]] = np.linalg.inv(self._rotation)
         return precision
 
     def _system(self) -> tuple[Floats, Floats]:
@@ -94,9 +96,8 @@ class _Estimation:
     def _update(self, mean: Floats, covariance: Floats) -> None:
         c = self._c
         second = covariance + np.outer(mean, mean)
-        blocks = second[: 3 * c, : 3 * c].reshape(c, 3, c, 3)
         square = np.maximum(np.diag(second), 0.0)
-        rotation = np.einsum("cicj->ij", blocks) / c
+        rotation = second[self._own[:, :, None], self._own[:, None, :]].sum(0) / c
         self._rotation = (rotation + rotation.T) / 2 + max(_LEAST, _LEAST * float(np.trace(rotation))) * np.eye(3)
         self._scale = float(square[3 * c : 4 * c].mean()) + _LEAST
         self._shift = float(square[4 * c :].mean()) + _LEAST * self._unit**2
@@ -104,7 +105,7 @@ class _Estimation:
 
     def _update_noise(self, mean: Floats, second: Floats) -> None:
         self._noise = [
-            _noise(p, p.total - 2 * float(p.linear @ mean) + float(np.sum(p.square * second))) for p in self._parts
+            _noise(p, p.total - 2 * float(p.linear @ mean) + float(np.vdot(p.square, second))) for p in self._parts
         ]
 
     def noise_given(self, variances: Variances) -> Variances:
@@ -138,8 +139,7 @@ def _without_bias(parts: tuple[Summary, Summary]) -> Variances:
 
 def with_noise_of(misclosures: Misclosures, variances: Variances) -> Variances:
     """Known variances of the errors of whole curves, with the noise that other equations of the same network show."""
-    (segments, normals), curves, marks = misclosures.sample(_MOST_MARKS)
-    parts = segments.eliminated(), normals.eliminated()
+    parts, curves, marks = misclosures.sample(_MOST_MARKS)
     return _Estimation(parts, len(curves), len(marks), 1.0).noise_given(variances)
 
 
@@ -148,6 +148,5 @@ def estimate_variances(misclosures: Misclosures, first_shift: float) -> tuple[Va
 
     A large network is judged by the part around its busiest node.
     """
-    (segments, normals), curves, marks = misclosures.sample(_MOST_MARKS)
-    parts = segments.eliminated(), normals.eliminated()
+    parts, curves, marks = misclosures.sample(_MOST_MARKS)
     return _without_bias(parts), _Estimation(parts, len(curves), len(marks), first_shift).run()

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracemesh.errors import ScanError
-from tracemesh.geometry.rotations import align_signs, darboux_frames, lengths, matrix_to_quaternion, normalized
+from tracemesh.geometry.rotations import align_signs, darboux_frames, matrix_to_quaternion, normalized
 from tracemesh.geometry.scan import CurveScan, curve_name
 from tracemesh.geometry.sensing.orientation import angles_between
+from tracemesh.geometry.vectors import lengths
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

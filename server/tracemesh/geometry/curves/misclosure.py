@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import breadth_first_order
-from scipy.sparse.linalg import splu
 
 from tracemesh.geometry.curves.positions import segment_vectors, solve_positions
 from tracemesh.geometry.curves.quadrature import edge_vectors
@@ -66,24 +65,21 @@ class Equations:
     free: csc_array
     shared: csc_array
 
-    def part(self, rows: Ints, columns: Ints) -> "Equations":
-        """Only some equations, rows (k,), and only some of theta, columns (l,)."""
-        free = self.free.tocsr()[rows].tocsc()
-        used = np.flatnonzero(np.diff(free.indptr))
-        return Equations(self.y[rows], free[:, used], self.shared.tocsr()[rows].tocsc()[:, columns])
+    def summary(self, rows: Ints, columns: Ints) -> "Summary":
+        """Sums over some equations, rows (k,), when their free unknowns are fitted; only some of theta, columns (l,).
 
-    def eliminated(self) -> "Summary":
-        """Sums over the equations that remain when the free unknowns are fitted."""
-        g, a = self.shared, self.free
-        square, linear = (g.T @ g).toarray(), g.T @ self.y
-        total, rank = float(self.y @ self.y), a.shape[1]
-        if rank:
-            right = np.column_stack([(a.T @ g).toarray(), a.T @ self.y])
-            fitted = splu((a.T @ a).tocsc()).solve(right)
+        They are few: dense matrices are quicker.
+        """
+        y, a, g = self.y[rows], self.free.tocsr()[rows].toarray(), self.shared.tocsr()[rows].toarray()[:, columns]
+        a = a[:, a.any(axis=0)]
+        square, linear, total = g.T @ g, g.T @ y, float(y @ y)
+        if a.shape[1]:
+            right = a.T @ np.column_stack([g, y])
+            fitted = np.linalg.solve(a.T @ a, right)
             square -= right[:, :-1].T @ fitted[:, :-1]
-            linear = linear - right[:, :-1].T @ fitted[:, -1]
+            linear -= right[:, :-1].T @ fitted[:, -1]
             total -= float(right[:, -1] @ fitted[:, -1])
-        return Summary(square, linear, max(total, 0.0), len(self.y) - rank)
+        return Summary(square, linear, max(total, 0.0), len(y) - a.shape[1])
 
 
 @dataclass(frozen=True)
@@ -194,8 +190,10 @@ class Misclosures:
             rates[first:last] = np.gradient(normal[first:last], layout.arc[first:last], axis=0)
         return rates
 
-    def sample(self, most_marks: int) -> tuple[tuple[Equations, Equations], Ints, Ints]:
-        """Equations between at most about `most_marks` marks that lie together; their curves (k,) and marks (l,)."""
+    def sample(self, most_marks: int) -> tuple[tuple[Summary, Summary], Ints, Ints]:
+        """Sums over the equations between at most about `most_marks` marks that lie together; their curves (k,) and
+        marks (l,).
+        """
         layout = self.layout
         chosen = _neighbourhood(layout, most_marks)
         inside = chosen[layout.segment_nodes].all(axis=1)
@@ -204,8 +202,8 @@ class Misclosures:
         columns = np.concatenate(
             [(3 * curves[:, None] + np.arange(3)).ravel(), 3 * self.curves + curves, 4 * self.curves + marks]
         )
-        three, two = np.repeat(inside, 3), np.repeat(chosen[layout.nodes], 2)
-        parts = self.segments.part(np.flatnonzero(three), columns), self.normals.part(np.flatnonzero(two), columns)
+        three, two = (np.flatnonzero(np.repeat(m, k)) for m, k in ((inside, 3), (chosen[layout.nodes], 2)))
+        parts = self.segments.summary(three, columns), self.normals.summary(two, columns)
         return parts, curves, marks
 
 

@@ -63,8 +63,10 @@ def node_positions(layout: Layout, vectors: Floats, weights: Floats) -> Floats:
     a, b = ends[:, 0], ends[:, 1]
     rows, columns = np.stack([a, b, a, b], axis=1)[..., None], np.stack([a, b, b, a], axis=1)[:, :, None]
     values = np.stack([weights, weights, -weights, -weights], axis=1)
-    index = tuple(np.broadcast_to(i, values.shape).ravel() for i in (rows, columns))
-    laplacian = coo_array((values.ravel(), index), shape=(3 * count, 3 * count)).tocsc()[3:, 3:]
+    row, column = (np.broadcast_to(i, values.shape).ravel() - 3 for i in (rows, columns))
+    kept = (row >= 0) & (column >= 0)  # node 0 stays where it is
+    entries = (values.ravel()[kept], (row[kept], column[kept]))
+    laplacian = coo_array(entries, shape=(3 * count - 3, 3 * count - 3)).tocsc()
     pull = (weights @ vectors[:, :, None])[:, :, 0]
     right = np.bincount(b.ravel(), pull.ravel(), 3 * count) - np.bincount(a.ravel(), pull.ravel(), 3 * count)
     points = np.concatenate([np.zeros(3), splu(laplacian).solve(right[3:])]).reshape(-1, 3)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
+from scipy.linalg.lapack import dpbsv
 
 from tracemesh.geometry.curves.energy import Weights
 from tracemesh.geometry.curves.interpolation import interpolate
@@ -127,8 +127,10 @@ class DevelopedSpline:
     def solve(self, data: Bands, penalty: Bands) -> Floats:
         """Offsets (n, 3), rad, of the smooth frames from the resampled ones."""
         matrix, right = data[0] + penalty[0], data[1] + penalty[1]
-        result: Floats = solveh_banded(matrix, right, True, True, lower=True, check_finite=False)
-        return result
+        _, result, failed = dpbsv(matrix, right, lower=1, overwrite_ab=1, overwrite_b=1)
+        if failed:
+            raise np.linalg.LinAlgError(f"row {failed} of the spline's system is not determined")
+        return np.asarray(result)
 
     def frames(self, offset: Floats) -> Floats:
         """Frames (n, 3, 3) at offsets (n, 3), rad, from the resampled ones."""

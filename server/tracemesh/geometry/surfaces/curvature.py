@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tracemesh.geometry.network import Floats, Ints
 from tracemesh.geometry.surfaces.laplacian import lumped_mass, triangle_areas
+from tracemesh.geometry.vectors import corner_sum, dot, lengths
 
 
 def mean_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
@@ -18,9 +19,10 @@ def mean_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
     where the sum lacks faces.
     """
     corners = vertices[faces]
-    facing = normalised(normals[faces].sum(1))
+    turned = normals[faces]
+    facing = normalised(corner_sum(turned))
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-    flux = 0.5 * (np.cross(opposite, facing[:, None]) * normals[faces]).sum(2)
+    flux = 0.5 * dot(opposite, np.cross(facing[:, None], turned))
     total = np.bincount(faces.ravel(), flux.ravel(), len(vertices))
     return np.asarray(-0.5 * total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
 
@@ -34,7 +36,7 @@ def gaussian_curvature(vertices: Floats, faces: Ints, normals: Floats) -> Floats
     """
     corners, turned = vertices[faces], normals[faces]
     own = normalised(_spanned(corners))
-    swept = 0.5 * (_spanned(turned) * own).sum(1)
+    swept = 0.5 * dot(_spanned(turned), own)
     total = np.bincount(faces.ravel(), np.repeat(swept / 3, 3), len(vertices))
     return np.asarray(total / lumped_mass(triangle_areas(corners), faces, len(vertices)))
 
@@ -46,7 +48,7 @@ def sphere_normals(vertices: Floats, faces: Ints) -> Floats:
     """
     edges = np.roll(vertices[faces], -1, axis=1) - vertices[faces]  # from every corner to the next
     behind = np.roll(edges, 1, axis=1)
-    size = (edges**2).sum(2) * (behind**2).sum(2)
+    size = dot(edges, edges) * dot(behind, behind)
     share = np.cross(behind, edges) / size[..., None]
     return normalised(np.column_stack([np.bincount(faces.ravel(), share[..., k].ravel()) for k in range(3)]))
 
@@ -74,5 +76,5 @@ def extended_to_boundary(values: Floats, faces: Ints, open_boundary: NDArray[np.
 
 def normalised(vectors: Floats) -> Floats:
     """(..., 3) unit vectors; a zero vector stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0, length, 1.0))
+    size = lengths(vectors)[..., None]
+    return np.asarray(vectors / np.where(size > 0, size, 1.0))

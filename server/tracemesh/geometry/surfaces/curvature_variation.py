@@ -15,6 +15,7 @@ from tracemesh.geometry.network import Floats, Ints
 from tracemesh.geometry.surfaces.curvature import normalised
 from tracemesh.geometry.surfaces.edges import InteriorEdges
 from tracemesh.geometry.surfaces.laplacian import cotangent_weights, lumped_mass, triangle_areas
+from tracemesh.geometry.vectors import dot
 
 SMALLEST_WEIGHT = 0.02  # of an edge in the Laplacian of the curvature: keeps it semidefinite where triangles are obtuse
 
@@ -51,7 +52,7 @@ def _jump_rows(shape: Shape, weights: Floats) -> sparse.csr_matrix:
     corners = np.stack([edges.start, edges.end, edges.left_tip, edges.right_tip])
     middle = normalised(shape.normals[edges.start] + shape.normals[edges.end])
     along = shape.vertices[edges.end] - shape.vertices[edges.start]
-    along = normalised(along - (along * middle).sum(1, keepdims=True) * middle)
+    along = normalised(along - dot(along, middle)[:, None] * middle)
     columns = (3 * corners.T[:, :, None] + np.arange(3)).ravel()
     rows = np.repeat(np.arange(len(along)), 12)
     size = (len(along), 3 * len(shape.vertices))

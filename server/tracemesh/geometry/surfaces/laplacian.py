@@ -11,6 +11,7 @@ import robust_laplacian
 from scipy import sparse
 
 from tracemesh.geometry.network import Floats, Ints
+from tracemesh.geometry.vectors import dot
 
 MOST_NEGATIVE_WEIGHT = -0.1  # of an edge: two angles that add to 192 degrees
 
@@ -54,15 +55,15 @@ def cotangent_weights(corners: Floats) -> Floats:
     """(f, 3) half the cotangent of the angle at every corner; the weight of the opposite edge. corners: (f, 3,
     2 or 3).
     """
-    edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # edge k lies opposite of corner k
-    dots = -(np.roll(edges, -1, axis=1) * np.roll(edges, -2, axis=1)).sum(2)
+    a, b, c = (corners[:, k] for k in range(3))
+    dots = np.column_stack([dot(b - a, c - a), dot(c - b, a - b), dot(a - c, b - c)])
     return np.asarray(dots / (4 * triangle_areas(corners)[:, None]))
 
 
 def triangle_areas(corners: Floats) -> Floats:
     """(f,) m^2. corners: (f, 3, 2 or 3)."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    gram = (a * a).sum(1) * (b * b).sum(1) - (a * b).sum(1) ** 2
+    gram = dot(a, a) * dot(b, b) - dot(a, b) ** 2
     return np.asarray(0.5 * np.sqrt(np.maximum(gram, np.finfo(float).tiny)))
 
 

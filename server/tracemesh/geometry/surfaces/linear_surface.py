@@ -7,6 +7,7 @@ from tracemesh.geometry.surfaces.biharmonic import BiharmonicSolver
 from tracemesh.geometry.surfaces.curvature import mean_curvature, normalised, sphere_normals
 from tracemesh.geometry.surfaces.edges import boundary_vertices
 from tracemesh.geometry.surfaces.laplacian import Laplacian, surface_laplacian
+from tracemesh.geometry.vectors import dot
 
 REBUILDS = 2  # solves in the metric of the last one; more change little
 
@@ -44,7 +45,7 @@ def settled_surface(
     vertices, spread, solver = _rebuilt_along_normals(vertices, faces, points, normals, lift)
     short = _missing_curvature(vertices, faces, spread, len(points))
     more = solver.solve(np.zeros_like(points), (-2 * short * solver.mass)[:, None] * spread)
-    return vertices + (more * spread).sum(1, keepdims=True) * spread, spread
+    return vertices + dot(more, spread)[:, None] * spread, spread
 
 
 def _rebuilt_along_normals(
@@ -52,7 +53,7 @@ def _rebuilt_along_normals(
 ) -> tuple[Floats, Floats, BiharmonicSolver]:
     """Vertices moved along their normals to where one more solve puts them, the normals, and the solver."""
     solver, rebuilt, spread = _solved(surface_laplacian(vertices, faces), faces, points, normals, lift)
-    moved = vertices + ((rebuilt - vertices) * spread).sum(1, keepdims=True) * spread
+    moved = vertices + dot(rebuilt - vertices, spread)[:, None] * spread
     return np.vstack([points, moved[len(points) :]]), spread, solver
 
 
@@ -73,6 +74,6 @@ def _solved(
     """The solver, and the vertices and normals that it finds."""
     solver = BiharmonicSolver(laplacian, len(points), boundary_vertices(faces, len(laplacian.mass)))
     base, spread = np.hsplit(solver.solve(np.hstack([points, normals])), 2)
-    spread = normalised(spread + np.sqrt(np.maximum(1 - (spread**2).sum(1, keepdims=True), 0)) * lift)
+    spread = normalised(spread + np.sqrt(np.maximum(1 - dot(spread, spread)[:, None], 0)) * lift)
     target = (-2 * mean_curvature(base, faces, spread) * laplacian.mass)[:, None] * spread
     return solver, solver.solve(points, target), spread

@@ -8,6 +8,7 @@ from scipy import sparse
 
 from tracemesh.geometry.network import Floats, Ints
 from tracemesh.geometry.surfaces.edges import unique_edges
+from tracemesh.geometry.vectors import corner_sum, dot, lengths
 
 
 @dataclass(frozen=True)
@@ -46,13 +47,13 @@ def triangle_angles(vertices: Floats, faces: Ints) -> Floats:
     """(f, 3) rad, the angle at every corner."""
     corners = vertices[faces]
     to_next, to_last = np.roll(corners, -1, axis=1) - corners, np.roll(corners, -2, axis=1) - corners
-    return np.asarray(np.arctan2(np.linalg.norm(np.cross(to_next, to_last), axis=2), (to_next * to_last).sum(2)))
+    return np.asarray(np.arctan2(lengths(np.cross(to_next, to_last)), dot(to_next, to_last)))
 
 
 def inverted_faces(vertices: Floats, faces: Ints, normals: Floats) -> NDArray[np.bool_]:
     """(f,) whether a face looks more than 90 degrees away from the sum of the normals at its corners."""
-    a, b, c = vertices[faces].transpose(1, 0, 2)
-    return np.asarray((np.cross(b - a, c - a) * normals[faces].sum(1)).sum(1) <= 0)
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.asarray(dot(np.cross(b - a, c - a), corner_sum(normals[faces])) <= 0)
 
 
 def _component_count(edges: Ints) -> int:

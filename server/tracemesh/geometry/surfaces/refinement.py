@@ -32,6 +32,7 @@ from tracemesh.geometry.surfaces.curvature_variation import Shape, variation_row
 from tracemesh.geometry.surfaces.edges import boundary_vertices, interior_edges, unique_edges
 from tracemesh.geometry.surfaces.laplacian import triangle_areas
 from tracemesh.geometry.surfaces.quality import inverted_faces
+from tracemesh.geometry.vectors import dot, lengths
 
 CONTACT_WEIGHT = 1000.0  # w: from 100 on, results no longer depend on it; much beyond, noise in the normals shows
 LENGTH_PER_PATCH = 0.4  # length over the root of the mean patch area
@@ -94,7 +95,8 @@ def _disagreement(shape: Shape, fixed: int) -> float:
     """Slope of the surface's edges against its normals, over that of the network's own edges (root mean squares)."""
     edges = unique_edges(shape.faces)[0]
     vector = shape.vertices[edges[:, 1]] - shape.vertices[edges[:, 0]]
-    slope = (vector * shape.normals[edges].sum(1)).sum(1) / (2 * np.linalg.norm(vector, axis=1))
+    both = shape.normals[edges[:, 0]] + shape.normals[edges[:, 1]]
+    slope = dot(vector, both) / (2 * lengths(vector))
     on_network = edges.max(1) < fixed
     data, inside = (np.sqrt(np.mean(slope[mask] ** 2)) for mask in (on_network, ~on_network))
     return float(inside / max(data, np.finfo(float).eps))
@@ -109,7 +111,7 @@ def untrusted(
     """
     before, after = (inverted_faces(vertices, faces, normals) for vertices, normals in (given, refined))
     worse = np.bincount(patch, after) > np.bincount(patch, before)
-    moved = np.linalg.norm(refined[0] - given[0], axis=1)[faces].max(1)
+    moved = lengths(refined[0] - given[0])[faces].max(1)
     area = np.bincount(patch, triangle_areas(given[0][faces]))
     np.logical_or.at(worse, patch, ~(moved <= LARGEST_MOVE * np.sqrt(area[patch])))
     mask = np.zeros(len(given[0]), bool)
@@ -129,6 +131,7 @@ def _gauss_newton_step(shape: Shape, fixed: int, length: float, size: float) -> 
     turn = np.linalg.norm(step[:, 1:], axis=1)
     step[:, 1:] *= np.minimum(1, LARGEST_TURN / np.maximum(turn, LARGEST_TURN))[:, None]
     normals = normalised(shape.normals + step[:, 1:2] * first + step[:, 2:] * second)
+    normals[:fixed] = shape.normals[:fixed]
     moved = replace(shape, vertices=shape.vertices + along[:, None] * shape.normals, normals=normals)
     return moved, float(residual @ residual), float(np.abs(along).max())
 
@@ -155,11 +158,11 @@ def _contact_rows(shape: Shape, first: Floats, second: Floats, size: float) -> t
     normal = 0.5 * (shape.normals[i] + shape.normals[j])
     areas = triangle_areas(shape.vertices[shape.faces])
     area = (areas[shape.edges.left] + areas[shape.edges.right]) / 3
-    weight = np.sqrt(CONTACT_WEIGHT * area) / (size**2 * np.linalg.norm(edge, axis=1))
-    moves = [weight * (sign * shape.normals[end] * normal).sum(1) for sign, end in ((-1, i), (1, j))]
-    turns = [weight * (edge * axis[end]).sum(1) / 2 for end in (i, j) for axis in (first, second)]
+    weight = np.sqrt(CONTACT_WEIGHT * area) / (size**2 * lengths(edge))
+    moves = [weight * sign * dot(shape.normals[end], normal) for sign, end in ((-1, i), (1, j))]
+    turns = [weight * dot(edge, axis[end]) / 2 for end in (i, j) for axis in (first, second)]
     values = np.concatenate([*moves, *turns])
     columns = np.concatenate([3 * i, 3 * j, 3 * i + 1, 3 * i + 2, 3 * j + 1, 3 * j + 2])
     rows = np.tile(np.arange(len(i)), 6)
     matrix = sparse.csr_matrix((values, (rows, columns)), (len(i), 3 * len(shape.vertices)))
-    return matrix, weight * (edge * normal).sum(1)
+    return matrix, weight * dot(edge, normal)

@@ -30,6 +30,7 @@ from tracemesh.geometry.surfaces.patches import PatchMesh
 from tracemesh.geometry.surfaces.refinement import Refined, refine, untrusted
 from tracemesh.geometry.surfaces.subdivision import thinned
 from tracemesh.geometry.surfaces.surface_stages import Stages, SurfaceParameters, linear_patches, settled
+from tracemesh.geometry.vectors import corner_sum, dot
 
 COARSE = 1200  # vertices of the thinned network's mesh, about
 COARSE_PER_PATCH = 40  # and not fewer per patch
@@ -122,11 +123,11 @@ def _sampled(
         own = np.setdiff1d(patches.faces[patches.patch == number], np.arange(patches.fixed))
         weight, _, face = ClosestPoints(coarse.vertices, faces)(vertices[own])
         corner, facing = coarse.vertices[faces[face]], coarse.normals[faces[face]]
-        flat = (corner * weight[..., None]).sum(1)
-        height = ((corner - flat[:, None]) * facing).sum(2, keepdims=True)  # of the tangent planes over the triangle
-        point = flat + 0.5 * (height * facing * weight[..., None]).sum(1)
-        away[own] = ((point - vertices[own]) * normals[own]).sum(1)
-        turned[own] = normalised((facing * weight[..., None]).sum(1))
+        flat = corner_sum(corner * weight[..., None])
+        height = dot(corner - flat[:, None], facing)  # of the tangent planes over the triangle
+        point = flat + 0.5 * corner_sum(facing * (height * weight)[..., None])
+        away[own] = dot(point - vertices[own], normals[own])
+        turned[own] = normalised(corner_sum(facing * weight[..., None]))
     return away, turned
 
 
