@@ -16,6 +16,7 @@ from benchmarks.surfacing import REFERENCES, surface_error, truth_of
 from tests.geometry.network_fixtures import octants, radial, rings, sideways, upwards, window
 from tracemesh.errors import Cancelled, SurfaceError, TracemeshError
 from tracemesh.formats.networks import read_network
+from tracemesh.geometry.comparison.closest import ClosestPoints
 from tracemesh.geometry.mesh import Mesh
 from tracemesh.geometry.network import CurveNetwork, Floats, Segment
 from tracemesh.geometry.surfaces.edges import unique_edges
@@ -106,6 +107,26 @@ def test_order_and_direction_of_curves_do_not_matter() -> None:
     )
     one, other = (span_surface(n).mesh for n in (network, shuffled))
     assert cKDTree(one.vertices).query(other.vertices)[0].max() < 1e-9 * network.diagonal
+
+
+def test_numbering_of_points_and_start_of_closed_curves_do_not_matter() -> None:
+    """A seam around an egg: nothing but the seam's own shape tells where its patches are cut and how they lie."""
+    seam = rings([(1, 0, False)], radial)
+    stretch = np.array([1.3, 1.0, 0.8])
+    points = seam.points * stretch
+    points[:, 0] += 0.05 * points[:, 1] ** 2
+    network = replace(seam, points=points, normals=radial(seam.normals / stretch))
+    order = np.random.default_rng(1).permutation(len(points))
+    closed = np.roll(np.argsort(order), 5)
+    other = replace(
+        network,
+        points=points[order],
+        normals=network.normals[order],
+        segments=(replace(seam.segments[0], points=np.append(closed, closed[0])),),
+    )
+    one, moved = (span_surface(n).mesh for n in (network, other))
+    distance = ClosestPoints(one.vertices, one.faces)(moved.vertices)[1]
+    assert distance.max() < 1e-4 * network.diagonal
 
 
 def test_nearly_flat_patches_are_meshed_at_once_and_others_unrolled_first() -> None:

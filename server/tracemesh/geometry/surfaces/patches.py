@@ -19,6 +19,7 @@ from tracemesh.geometry.surfaces.planar_maps import (
     parted,
     project_to_plane,
     signed_area,
+    turned,
 )
 from tracemesh.geometry.surfaces.quality import inverted_faces, triangle_angles
 from tracemesh.geometry.surfaces.triangulation import triangulate_polygon
@@ -180,11 +181,12 @@ def _triangulate(
     points, normals = outline.points, outline.normals
     size = spacing or _perimeter(points) / len(points)
     reason = "its boundary turns the wrong way"
+    whole = len(np.unique(outline.vertex)) == len(points)  # else its walk begins at a slit, wherever its curves do
     maps: tuple[Callable[[], Floats | None], ...] = (
         lambda: unrolled,
         lambda: project_to_plane(points, normals),
-        lambda: develop(points, normals),
-        lambda: map_to_circle(points),
+        lambda: turned(develop(points, normals), points) if whole else develop(points, normals),
+        lambda: turned(map_to_circle(points), points) if whole else map_to_circle(points),
     )
     for plane_map in maps:
         loop = plane_map()

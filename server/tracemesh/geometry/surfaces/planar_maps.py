@@ -18,10 +18,21 @@ def project_to_plane(points: Floats, normals: Floats) -> Floats | None:
     normal = normalised(average)
     offset = points - points.mean(0)
     offset -= np.outer(offset @ normal, normal)
-    distance = np.linalg.norm(offset, axis=1)
-    # An axis that turns with the loop, and does not flicker between corners that are equally far.
-    first = normalised(offset[np.argmax(distance > (1 - 1e-6) * distance.max())])
+    first = normalised(offset[_farthest(offset)])
     return np.asarray(offset @ np.column_stack([first, np.cross(normal, first)]))
+
+
+def _farthest(offset: Floats) -> int:
+    """Corner with the largest offset (k, d): turns with the loop, and does not flicker between some equally far."""
+    distance = np.linalg.norm(offset, axis=1)
+    return int(np.argmax(distance > (1 - 1e-6) * distance.max()))
+
+
+def turned(loop: Floats, points: Floats) -> Floats:
+    """(k, 2) m, a loop in the plane turned as its shape in space, points (k, 3), has it, wherever it starts."""
+    offset = loop - loop.mean(0)
+    x, y = normalised(offset[_farthest(points - points.mean(0))])
+    return np.asarray(offset @ np.array([[x, -y], [y, x]]))
 
 
 def develop(points: Floats, normals: Floats) -> Floats:
