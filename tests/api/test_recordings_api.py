@@ -107,4 +107,11 @@ def _conditional_and_partial(server: Any, path: str) -> None:
     part = server.http.get(path, headers={"Range": "bytes=4-11", "If-Range": etag})
     assert (part.status_code, part.content) == (206, whole.content[4:12])
     assert part.headers["content-range"] == f"bytes 4-11/{len(whole.content)}"
-    assert server.http.get(path, headers={"Range": f"bytes={len(whole.content)}-"}).status_code == 416
+    beyond = server.http.get(path, headers={"Range": f"bytes={len(whole.content)}-"})
+    assert (beyond.status_code, beyond.headers["content-range"]) == (416, f"bytes */{len(whole.content)}")
+    malformed = server.http.get(path, headers={"Range": "bytes=b-a"})
+    assert malformed.status_code == 400
+    for refused in (beyond, malformed):
+        assert refused.headers["content-type"] == "application/problem+json"
+        assert (refused.json()["status"], refused.json()["instance"]) == (refused.status_code, f"/api/v1{path}")
+        assert "range" in refused.json()["detail"].lower()

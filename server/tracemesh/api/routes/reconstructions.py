@@ -3,10 +3,10 @@
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Header, Query, Request, Response
-from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from tracemesh.api.conditions import UseConditions
+from tracemesh.api.download import Download
 from tracemesh.api.paging import UsePage
 from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
 from tracemesh.api.upload import file_body, read_body, store_network
@@ -86,7 +86,7 @@ def cancel(reconstruction: Identifier, services: UseServices) -> Reconstruction:
     return stopped
 
 
-@router.get("/reconstructions/{reconstruction}/{name}", response_class=FileResponse)
+@router.get("/reconstructions/{reconstruction}/{name}", response_class=Download)
 def artifact(
     reconstruction: Identifier,
     name: Literal["network.json", "mesh.glb", "report.json"],
@@ -99,4 +99,4 @@ def artifact(
     headers = {"ETag": f'"{row.sha256}"', "Cache-Control": "private, no-cache"}
     if f'"{row.sha256}"' in if_none_match or if_none_match.strip() == "*":
         return Response(status_code=304, headers=headers)
-    return FileResponse(services.artifacts.path(row.sha256), headers=headers, media_type=MEDIA_TYPES[name])
+    return Download(services.artifacts.path(row.sha256), headers=headers, media_type=MEDIA_TYPES[name])
