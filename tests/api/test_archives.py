@@ -2,12 +2,18 @@
 
 import io
 import json
+import signal
+import subprocess
+import sys
 import time
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tracemesh.storage.database import Database
+from tracemesh.storage.sessions import list_sessions
 
 
 @pytest.fixture
@@ -96,6 +102,64 @@ def _damage_leaves_nothing(server: Any, archive: bytes) -> None:
         assert answer.status_code == 422, says
         assert says in answer.json()["detail"]
     assert len(server.http.get("/sessions?limit=500").json()) == before
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from sqlalchemy import event
+from tracemesh.api.routes.archives import restored
+from tracemesh.settings import Settings
+from tracemesh.storage.artifacts import open_artifacts
+from tracemesh.storage.database import Database
+
+settings = Settings(database_url=sys.argv[1], data_dir=Path(sys.argv[2]))
+
+def take_in(left):
+    database = Database(settings.resolved_database_url)
+
+    @event.listens_for(database.engine, "before_cursor_execute")
+    def count(*_):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            os.kill(os.getpid(), 9)
+
+    with open(sys.argv[3], "rb") as file:
+        restored(database, open_artifacts(settings), file, 10**9, "derived")
+
+for statements in map(int, sys.argv[4:]):
+    if (child := os.fork()) == 0:
+        take_in(statements)
+        os._exit(0)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+"""Takes in an archive again and again, in processes that kill themselves before a certain statement."""
+
+
+def test_a_restore_that_is_killed_leaves_nothing_and_asking_again_makes_it_whole(
+    server: Any, session: str, new_database: Any, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    archive, url = tmp_path / "archive.zip", new_database(request.node.callspec.params["server"])
+    archive.write_bytes(server.http.get(f"/sessions/{session}/archive").content)
+    database = Database(url)
+    database.migrate()
+
+    def run(*statements: int) -> list[int]:
+        command = [sys.executable, "-c", KILLED, url, tmp_path, archive, *map(str, statements)]
+        done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+        return list(map(int, done.stdout.split()))
+
+    def known() -> list[tuple[int, int]]:
+        with database.read() as transaction:
+            return [(s.curves, s.samples) for s in list_sessions(transaction, 10)]
+
+    assert run(3, 12, 25, 40) == [-signal.SIGKILL] * 4
+    assert known() == []
+    told = server.http.get(f"/sessions/{session}").json()
+    assert run(10**6, 10**6) == [0, 0]
+    assert known() == [(told["curves"], told["samples"])]
+    database.close()
 
 
 def test_a_bomb_is_not_unpacked(start_server: Any) -> None:

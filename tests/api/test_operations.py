@@ -23,6 +23,21 @@ def test_asking_again_makes_nothing(server: Any, shared_data: Path) -> None:
     assert len(server.http.get(path).json()) == 1
     assert server.http.post(path, json={"step": "4%"}, headers=KEY).status_code == 409
     assert server.http.post(path, json={"step": "3%"}).json()["id"] != jobs[0]["id"]
+    archive = server.http.get(f"/sessions/{session}/archive").content
+    copies = [server.http.post("/sessions/archive", content=archive, headers=KEY).json() for _ in range(2)]
+    assert copies[0] == copies[1]
+    assert copies[0]["curves"] == 3
+    assert len(server.http.get("/sessions", params={"name": "once"}).json()) == 2
+
+
+def test_a_network_sent_again_is_the_same_one(server: Any, shared_data: Path) -> None:
+    path, network = f"/sessions/{server.new_session()}/networks", next(shared_data.glob("networks/*.json")).read_bytes()
+    jobs = [server.http.post(path, content=network, headers=KEY).json()["id"] for _ in range(2)]
+    assert jobs[0] == jobs[1]
+    assert server.http.post(path, content=network + b" ", headers=KEY).status_code == 409
+    assert server.http.post(path, content=network).json()["id"] != jobs[0]
+    for job in {*jobs, *(job["id"] for job in server.http.get(path.replace("networks", "reconstructions")).json())}:
+        server.http.post(f"/reconstructions/{job}/cancel")
 
 
 def test_keys_of_different_sessions_do_not_meet(server: Any) -> None:

@@ -7,7 +7,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from pydantic import ValidationError
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import IntegrityError, OperationalError
 from starlette.exceptions import HTTPException
 
 from tracemesh.errors import Changed, Conflict, NotFound, TracemeshError, Unavailable
@@ -24,6 +24,7 @@ def install_handlers(app: FastAPI) -> None:
     app.add_exception_handler(HTTPException, _on_http_error)
     app.add_exception_handler(RequestValidationError, _on_invalid_request)
     app.add_exception_handler(OperationalError, _on_storage_error)
+    app.add_exception_handler(IntegrityError, _on_race)
     app.add_exception_handler(Exception, _on_bug)
 
 
@@ -63,6 +64,11 @@ async def _on_invalid_request(request: Request, error: Exception) -> Response:
 async def _on_storage_error(request: Request, error: Exception) -> Response:
     log.error("the database failed: %s", error)
     return problem(503, "the database does not answer, or cannot write", request.url.path)
+
+
+async def _on_race(request: Request, error: Exception) -> Response:
+    log.info("two requests made the same at the same time: %s", error)
+    return problem(409, "another request made the same at the same time: ask again", request.url.path)
 
 
 async def _on_bug(request: Request, error: Exception) -> Response:

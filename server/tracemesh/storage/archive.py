@@ -28,6 +28,8 @@ from tracemesh.wire.calibration import Calibration
 from tracemesh.wire.resources import Mark, MeasuredLength, ReconstructionParameters
 
 MANIFEST = "session.json"
+RECORDINGS = "recordings/"
+"""What the names of recordings in an archive begin with."""
 DAMAGED = (
     zipfile.BadZipFile,
     zlib.error,
@@ -175,7 +177,7 @@ def _recordings(transaction: Transaction, session: str) -> Iterator[tuple[str, b
     query = select(RecordingRow).where(RecordingRow.session_id == session).order_by(RecordingRow.key)
     for row in transaction.scalars(query):
         lines = [row.hello, *recording_messages(transaction, row.key)]
-        yield f"recordings/{row.id}.ndjson", b"".join(line + b"\n" for line in lines)
+        yield f"{RECORDINGS}{row.id}.ndjson", b"".join(line + b"\n" for line in lines)
 
 
 def _chosen_calibrations(transaction: Transaction, session: str) -> dict[str, Calibration]:

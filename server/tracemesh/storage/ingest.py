@@ -1,5 +1,6 @@
 """From accepted messages to committed rows: many devices' messages in one transaction, acknowledged only after it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -158,6 +159,16 @@ def _why_not(owner: str | None) -> Refused:
     if owner is None:
         return Refused("unknown", "the recording was deleted")
     return Refused("limit", "the recording goes on over another connection")
+
+
+def record(session: Session, hello: Hello, payload: bytes, messages: Iterable[tuple[Recorded, bytes]]) -> None:
+    """A whole recording at once; the caller commits. Raises Refused for what contradicts itself."""
+    state, group = open_recording(session, hello, payload), Group()
+    for message, line in messages:
+        state.check(message)
+        state.advance(message, len(line))
+        group.add(state, message, line)
+    commit(session, group)
 
 
 def open_recording(session: Session, hello: Hello, payload: bytes, owner: str = "") -> RecordingState:

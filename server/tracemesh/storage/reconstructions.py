@@ -60,9 +60,15 @@ def create_reconstruction(
 
 
 def give_artifact(transaction: Transaction, identifier: str, name: str, digest: str, size: int) -> Reconstruction:
-    """Let a reconstruction have a file before it runs: a network that is known already. Raises NotFound."""
+    """Let a reconstruction have a file before it runs: a network that is known already.
+
+    Raises NotFound, and Conflict when it has another one.
+    """
     row = _row(transaction, identifier)
-    if transaction.get(ArtifactRow, (row.id, name)) is None:  # else the same request came before
+    known = transaction.get(ArtifactRow, (row.id, name))
+    if known is not None and known.sha256 != digest:
+        raise Conflict(f"the same Idempotency-Key came with another {name} before")
+    if known is None:
         transaction.add(ArtifactRow(reconstruction_id=row.id, name=name, sha256=digest, size=size))
         transaction.flush()
     return describe(transaction, row)

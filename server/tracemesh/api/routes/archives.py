@@ -1,16 +1,20 @@
 """Sessions as files: everything of one in one archive."""
 
 import tempfile
-from collections.abc import AsyncIterator
-from contextlib import ExitStack, asynccontextmanager
+from contextlib import ExitStack
+from typing import IO
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from tracemesh.api.services import Services, UseServices
-from tracemesh.api.upload import SPOOLED, chunks, file_body, parse_upload, spool_body, store_upload
-from tracemesh.storage.archive import Manifest, read_archive, restore, write_archive
+from tracemesh.api.services import IdempotencyKey, UseServices
+from tracemesh.api.upload import SPOOLED, chunks, file_body, parse_upload, spool_body
+from tracemesh.storage.archive import RECORDINGS, read_archive, restore, write_archive
+from tracemesh.storage.artifacts import ArtifactStore
+from tracemesh.storage.database import Database
+from tracemesh.storage.ingest import record
+from tracemesh.storage.models import SessionRow, derived_id, new_id
 from tracemesh.storage.sessions import create_session, get_session
 from tracemesh.wire.base import Identifier
 from tracemesh.wire.resources import Session, SessionCreate
@@ -30,43 +34,31 @@ def export(session: Identifier, services: UseServices) -> StreamingResponse:
 
 
 @router.post("/archive", status_code=201, openapi_extra=file_body("application/zip"))
-async def restore_session(request: Request, services: UseServices, response: Response) -> Session:
+async def restore_session(
+    request: Request, services: UseServices, response: Response, idempotency_key: IdempotencyKey = None
+) -> Session:
     """A new session from an archive: whole, or not at all."""
+    derived = idempotency_key and derived_id(idempotency_key, "archive")
+    limit = services.settings.max_session_bytes
     with tempfile.SpooledTemporaryFile(SPOOLED) as file:
         await spool_body(request, services.settings.max_upload_bytes, file)
-        manifest, contents = await run_in_threadpool(read_archive, file, services.settings.max_session_bytes)
-    async with _new_session(services, manifest.name) as session:
-        for name, content in contents.items():
-            if name.startswith("recordings/"):
-                upload = await run_in_threadpool(parse_upload, content, session, "")
-                await store_upload(services.recorder, upload)
-        await run_in_threadpool(_restore, services, session, manifest, contents)
-    services.edited(session)
-    response.headers["Location"] = f"/api/v1/sessions/{session}"
-    return await run_in_threadpool(_get, services, session)
+        made = await run_in_threadpool(restored, services.database, services.artifacts, file, limit, derived)
+    services.edited(made.id)
+    response.headers["Location"] = f"/api/v1/sessions/{made.id}"
+    return made
 
 
-@asynccontextmanager
-async def _new_session(services: Services, name: str) -> AsyncIterator[str]:
-    """A session that is gone again if what is put into it fails."""
-
-    def create() -> str:
-        with services.database.write() as transaction:
-            return create_session(transaction, SessionCreate(name=name)).id
-
-    session = await run_in_threadpool(create)
-    try:
-        yield session
-    except BaseException:
-        await services.recorder.delete_session(session)
-        raise
-
-
-def _restore(services: Services, session: str, manifest: Manifest, contents: dict[str, bytes]) -> None:
-    with services.database.write() as transaction:
-        restore(transaction, services.artifacts, session, manifest, contents)
-
-
-def _get(services: Services, session: str) -> Session:
-    with services.database.read() as transaction:
+def restored(
+    database: Database, store: ArtifactStore, file: IO[bytes], max_bytes: int, derived: str | None = None
+) -> Session:
+    """The session that an archive becomes, in one transaction; or the one that is called `derived` already."""
+    manifest, contents = read_archive(file, max_bytes)
+    session = derived or new_id()
+    uploads = [parse_upload(content, session, "") for name, content in contents.items() if name.startswith(RECORDINGS)]
+    with database.write() as transaction:
+        if derived is None or transaction.get(SessionRow, derived) is None:
+            create_session(transaction, SessionCreate(id=session, name=manifest.name))
+            for upload in uploads:
+                record(transaction, upload.hello, upload.payload, upload.messages)
+            restore(transaction, store, session, manifest, contents)
         return get_session(transaction, session)

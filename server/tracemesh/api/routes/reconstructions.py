@@ -37,10 +37,17 @@ def create(
 
 
 @router.post("/sessions/{session}/networks", status_code=202, openapi_extra=file_body("application/json"))
-async def span(session: Identifier, request: Request, services: UseServices, response: Response) -> Reconstruction:
+async def span(
+    session: Identifier,
+    request: Request,
+    services: UseServices,
+    response: Response,
+    idempotency_key: IdempotencyKey = None,
+) -> Reconstruction:
     """Take in a curve network that is known already (network JSON) and queue the surface that spans it."""
     content = await read_body(request, services.settings.max_upload_bytes)
-    made = await run_in_threadpool(store_network, services, session, content)
+    derived = idempotency_key and derived_id(idempotency_key, session, "network")
+    made = await run_in_threadpool(store_network, services, session, content, derived)
     return _queued(services, response, made)
 
 
