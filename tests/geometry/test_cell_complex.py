@@ -9,9 +9,14 @@ import pytest
 
 from tests.geometry.network_fixtures import octants, radial, rings, sideways, window
 from tracemesh.errors import NetworkError
+from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
 from tracemesh.geometry.network import CurveNetwork, Segment
+from tracemesh.geometry.scan import Scan
+from tracemesh.geometry.simulated.shapes import SHAPES
+from tracemesh.geometry.simulated.simulation import exact_scan
 from tracemesh.geometry.surfaces.cell_complex import cell_complex
 from tracemesh.geometry.surfaces.cycles import geodesic_turning, trace_cycles
+from tracemesh.geometry.surfaces.subdivision import subdivided
 
 
 def flat_window(parts: int = 4) -> CurveNetwork:
@@ -124,3 +129,14 @@ def test_rings_are_paired_across_the_band_between_them() -> None:
 def test_curves_that_nothing_connects_are_named() -> None:
     with pytest.raises(NetworkError, match="closed curve 1 and closed curve 2: connect them"):
         cell_complex(rings([(1, 0, False), (1, 50, False)], radial))
+
+
+def test_nodes_are_named_as_the_scan_names_them() -> None:
+    scan = exact_scan(SHAPES["leaf"](), 0.01)
+    called = Scan(tuple(replace(c, node_ids=10 * c.node_ids + 7, boundary=i == 1) for i, c in enumerate(scan.curves)))
+    network = reconstruct_network(called, NetworkParameters(step=0.03)).network
+    fine = subdivided(network, 0.01)
+    segment = scan.curves[1].node_ids[:2] * 10 + 7
+    for told in (network, fine):
+        with pytest.raises(NetworkError, match=rf"segment {segment[0]}-{segment[1]} of curve 2 is marked as boundary"):
+            cell_complex(told)

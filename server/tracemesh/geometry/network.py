@@ -28,7 +28,8 @@ class CurveNetwork:
 
     points: (n, 3) m, world; every point once, nodes included. normals: (n, 3) outward unit surface normals.
     nodes: (k,) indices of the points that are nodes. segments: the polylines between them. uncertainty: (n,) m, root
-    mean square distance of each point from the truth; None where nobody knows it.
+    mean square distance of each point from the truth; None where nobody knows it. node_numbers: (k,) what the scan
+    calls the nodes, -1 where it has no number for one; None: as they are counted from 0.
     """
 
     points: Floats
@@ -36,6 +37,7 @@ class CurveNetwork:
     nodes: Ints
     segments: tuple[Segment, ...]
     uncertainty: Floats | None = None
+    node_numbers: Ints | None = None
 
     @property
     def diagonal(self) -> float:

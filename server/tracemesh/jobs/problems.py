@@ -65,7 +65,6 @@ class _Finder:
     def __init__(self, solved: SolvedNetwork, curves: Sequence[Curve]) -> None:
         self._solved, self._curves = solved, curves
         self._network = solved.network
-        self._numbers = {int(p): n for n, p in zip(sorted(solved.nodes), self._network.nodes, strict=False)}
 
     def problems(self) -> Iterator[NetworkProblem]:
         from tracemesh.geometry.surfaces.cell_complex import find_faults
@@ -132,15 +131,12 @@ class _Finder:
         return int(samples[before]), int(samples[before + len(self._network.segments[segment].points) - 1])
 
     def _renamed(self, fault: "Fault") -> str:
-        """The message with the numbers that people gave their nodes and curves."""
+        """The message with the numbers that people gave their curves."""
         from tracemesh.geometry.surfaces.cell_complex import segment_name
 
-        segment = self._network.segments[fault.segment]
-        name = segment_name(self._network, fault.segment)
-        if name.startswith("closed"):
-            return fault.message.replace(name, f"closed curve {self._curve(fault.segment).index + 1}")
-        first, last = (self._numbers.get(int(segment.points[end]), "?") for end in (0, -1))
-        return fault.message.replace(name, f"segment {first}-{last} of curve {self._curve(fault.segment).index + 1}")
+        index = self._curve(fault.segment).index
+        name, wanted = (segment_name(self._network, fault.segment, curve) for curve in (None, index))
+        return fault.message.replace(name, wanted)
 
 
 def _marked(curve: Curve, marks: set[tuple[int, int]]) -> CurveEdit:

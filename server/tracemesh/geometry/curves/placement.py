@@ -117,12 +117,17 @@ def place_curve(curve: CleanCurve) -> PlacedCurve:
     return _place_closed(curve) if curve.closed else _place_open(curve)
 
 
+def known_nodes(curves: Sequence[PlacedCurve]) -> Ints:
+    """Numbers (k,) of the marked nodes, increasing, as the scan has them."""
+    return np.unique(np.concatenate([c.nodes[c.nodes != _LOOSE] for c in curves]))
+
+
 def number_nodes(curves: Sequence[PlacedCurve]) -> tuple[list[Ints], Bools]:
     """Dense node numbers per curve, in the order of the scanned ones; which (k,) of them are nodes of the network.
 
     Loose ends come after the marked nodes. Both ends of a closed curve without nodes are one number, but no node.
     """
-    known = np.unique(np.concatenate([c.nodes[c.nodes != _LOOSE] for c in curves]))
+    known = known_nodes(curves)
     numbers, is_node = [], [True] * len(known)
     for curve in curves:
         dense = np.searchsorted(known, curve.nodes)

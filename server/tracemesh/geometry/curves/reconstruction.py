@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,7 +14,7 @@ from tracemesh.geometry.curves.cleaning import CleanCurve, clean_curves
 from tracemesh.geometry.curves.closing import Closed, close_network
 from tracemesh.geometry.curves.energy import Weights
 from tracemesh.geometry.curves.network_report import Misfit, bias_report, find_misfits
-from tracemesh.geometry.curves.placement import PlacedCurve, measured_layout, place_curve, uniform_layout
+from tracemesh.geometry.curves.placement import PlacedCurve, known_nodes, measured_layout, place_curve, uniform_layout
 from tracemesh.geometry.curves.polyline import MeasuredNetwork, measure_network, points_on_polyline
 from tracemesh.geometry.curves.positions import Positions, check_connected, solve_positions
 from tracemesh.geometry.curves.quadrature import edge_vectors
@@ -109,6 +109,7 @@ class NetworkReconstruction:
         self._cleaned = _cleaned(scan)
         curves = tuple(place_curve(curve) for curve in self._cleaned)
         self._indices = np.array([c.index for c in curves])
+        self._known_nodes = known_nodes(curves)
         self._stages.begin("measuring")
         check_connected(measured_layout(curves), self._indices)
         curves = with_lengths(curves)
@@ -144,6 +145,8 @@ class NetworkReconstruction:
         self._stages.begin("uncertainty")
         uncertainty = per_point(layout, self._uncertainty(layout, positions, regression.frames))
         network = assemble_network(layout, positions.points, regression.frames, uncertainty, self._indices)
+        loose = len(network.nodes) - len(self._known_nodes)
+        network = replace(network, node_numbers=np.append(self._known_nodes, np.full(loose, -1)))
         self._stages.end()
         misfits = self._misfits(layout, positions)
         report = self._report(network, regression, positions, used, uncertainty)

@@ -111,14 +111,16 @@ def _refuse(faults: list[Fault]) -> None:
         raise NetworkError(faults[0].message)
 
 
-def segment_name(network: CurveNetwork, index: int) -> str:
-    """A segment as a person finds it: the numbers of its end nodes and of its curve."""
-    segment = network.segments[index]
-    numbers = {int(point): number for number, point in enumerate(network.nodes)}
+def segment_name(network: CurveNetwork, index: int, curve: int | None = None) -> str:
+    """A segment as a person finds it: the numbers of its end nodes and of its curve, if that is not the network's."""
+    segment, called = network.segments[index], network.node_numbers
+    name = curve_name(segment.curve if curve is None else curve)
+    numbers = dict(zip(network.nodes.tolist(), range(len(network.nodes)) if called is None else called, strict=True))
     if segment.points[0] == segment.points[-1] and int(segment.points[0]) not in numbers:
-        return f"closed {curve_name(segment.curve)}"
-    first, last = (numbers.get(int(segment.points[end]), "?") for end in (0, -1))
-    return f"segment {first}-{last} of {curve_name(segment.curve)}"
+        return f"closed {name}"
+    ends = [numbers.get(int(segment.points[end]), -1) for end in (0, -1)]
+    first, last = ("?" if number < 0 else number for number in ends)
+    return f"segment {first}-{last} of {name}"
 
 
 def _check_arrays(network: CurveNetwork) -> None:

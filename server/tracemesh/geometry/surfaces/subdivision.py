@@ -56,7 +56,14 @@ def thinned(network: CurveNetwork, every: int) -> CurveNetwork:
     number = np.full(len(network.points), -1)
     number[kept] = np.arange(len(kept))
     segments = tuple(replace(s, points=number[c]) for s, c in zip(network.segments, chosen, strict=True))
-    return CurveNetwork(network.points[kept], network.normals[kept], number[network.nodes], segments)
+    return _with_points(network, network.points[kept], network.normals[kept], number[network.nodes], segments)
+
+
+def _with_points(
+    network: CurveNetwork, points: Floats, normals: Floats, nodes: Ints, segments: tuple[Segment, ...]
+) -> CurveNetwork:
+    """The network with other points (n, 3), the same nodes among them, which keep their numbers."""
+    return CurveNetwork(points, normals, nodes, segments, node_numbers=network.node_numbers)
 
 
 def _edges(network: CurveNetwork) -> tuple[Ints, Floats]:
@@ -78,7 +85,7 @@ def _inserted(network: CurveNetwork, edge: Ints, share: Floats) -> CurveNetwork:
         points.append(between)
         normals.append(facing)
         count, first = count + len(between), last
-    return CurveNetwork(np.vstack(points), np.vstack(normals), network.nodes, tuple(segments))
+    return _with_points(network, np.vstack(points), np.vstack(normals), network.nodes, tuple(segments))
 
 
 def _on_spline(network: CurveNetwork, segment: Segment, edge: Ints, share: Floats) -> tuple[Floats, Floats]:

@@ -151,7 +151,14 @@ def _part_of(complex_: CellComplex, outlines: list[Outline], chosen: Mask) -> Ce
         replace(face, points=number[face.points]) for face, c in zip(complex_.faces, chosen, strict=True) if c
     )
     segments = tuple(replace(segment, points=number[segment.points]) for segment in network.segments)
-    part = CurveNetwork(network.points[used], network.normals[used], number[network.nodes], segments)
+    part = replace(
+        network,
+        points=network.points[used],
+        normals=network.normals[used],
+        nodes=number[network.nodes],
+        segments=segments,
+        uncertainty=None,
+    )
     return replace(complex_, network=part, faces=faces)
 
 
