@@ -27,6 +27,26 @@ def test_a_rawnet_is_taken_in_as_if_a_device_had_sent_it(server: Any, lilium: by
     assert server.http.get(f"/sessions/{session}/recordings").json() == [answer.json()]
 
 
+def test_curves_and_recordings_come_in_pages(server: Any, lilium: bytes) -> None:
+    session = server.new_session()
+    for _ in range(3):
+        server.http.post(f"/sessions/{session}/recordings", content=lilium)
+    server.http.patch(f"/sessions/{session}/curves/4", json={"removed": True})
+    for what in ("curves", "recordings"):
+        whole = server.http.get(f"/sessions/{session}/{what}")
+        assert "link" not in whole.headers
+        found, path = [], f"/sessions/{session}/{what}?limit=2"
+        while path:
+            page = server.http.get(path)
+            assert len(page.json()) <= 2
+            found += page.json()
+            path = page.headers.get("link", "").partition(">")[0].removeprefix("</api/v1")
+        assert found == whole.json()
+    assert [c["index"] for c in server.http.get(f"/sessions/{session}/curves").json()] == [0, 1, 2, 3, 5, 6, 7, 8]
+    assert server.http.get(f"/sessions/{session}/curves?after=x").status_code == 422
+    assert server.http.get(f"/sessions/{session}/recordings?after=x").status_code == 404
+
+
 def test_replaying_an_export_gives_the_same_session(server: Any, lilium: bytes) -> None:
     first, second = server.new_session(), server.new_session()
     recording = server.http.post(f"/sessions/{first}/recordings", content=lilium).json()["id"]

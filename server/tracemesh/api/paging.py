@@ -12,6 +12,8 @@ from tracemesh.wire.base import Identifier
 T = TypeVar("T")
 MOST = 500
 """Things on one page."""
+MOST_DIGITS = 10
+"""Of a number: more than anything has, less than a database's integer."""
 
 
 class Page:
@@ -31,12 +33,16 @@ class Page:
         self.after = after
 
     @property
-    def window(self) -> slice:
-        """What to look for in a list whose things are called 0, 1, 2, ...; raises InputError."""
-        if self.after is not None and not self.after.isdecimal():
+    def first(self) -> int:
+        """Least number to look for in a list whose things are called 0, 1, 2, ...; raises InputError."""
+        if self.after is not None and not (self.after.isdecimal() and len(self.after) < MOST_DIGITS):
             raise InputError(f"wanted after=NUMBER, got {self.after}")
-        first = 0 if self.after is None else int(self.after) + 1
-        return slice(first, first + self.limit)
+        return 0 if self.after is None else int(self.after) + 1
+
+    @property
+    def window(self) -> slice:
+        """What to look for in such a list; raises InputError."""
+        return slice(self.first, self.first + self.limit)
 
     @property
     def limit(self) -> int:

@@ -12,10 +12,10 @@ from tracemesh.storage.sessions import session_row
 from tracemesh.wire.resources import Curve, CurveUpdate, Mark, MeasuredLength
 
 
-def list_curves(transaction: Transaction, session: str) -> list[Curve]:
-    """Curves of a session in the order of scanning, less those that were removed; raises NotFound."""
+def list_curves(transaction: Transaction, session: str, limit: int | None = None, first: int = 0) -> list[Curve]:
+    """At most `limit` curves of a session from an index on, less those that were removed; raises NotFound."""
     session_row(transaction, session)
-    return [_curve(transaction, row) for row in curve_rows(transaction, session)]
+    return [_curve(transaction, row) for row in curve_rows(transaction, session, limit, first)]
 
 
 def get_curve(transaction: Transaction, session: str, index: int) -> Curve:
@@ -66,10 +66,10 @@ def replace_marks(transaction: Transaction, row: CurveRow, marks: Iterable[Mark]
         transaction.add(MarkRow(recording_key=row.recording_key, number=row.number, sample=mark.sample, node=mark.node))
 
 
-def curve_rows(transaction: Transaction, session: str) -> list[CurveRow]:
-    """Rows of the curves that were not removed, in the order of scanning."""
-    kept = (CurveRow.session_id == session) & ~CurveRow.removed
-    return list(transaction.scalars(select(CurveRow).where(kept).order_by(CurveRow.index)))
+def curve_rows(transaction: Transaction, session: str, limit: int | None = None, first: int = 0) -> list[CurveRow]:
+    """Rows of the curves that were not removed, in the order of scanning; at most `limit` from an index on."""
+    kept = (CurveRow.session_id == session) & (CurveRow.index >= first) & ~CurveRow.removed
+    return list(transaction.scalars(select(CurveRow).where(kept).order_by(CurveRow.index).limit(limit)))
 
 
 def _row(transaction: Transaction, session: str, index: int) -> CurveRow:

@@ -16,10 +16,14 @@ PAGE = 200
 """Messages read at once."""
 
 
-def list_recordings(transaction: Transaction, session: str) -> list[RecordingSummary]:
-    """All recordings of a session in the order in which they began; raises NotFound."""
+def list_recordings(
+    transaction: Transaction, session: str, limit: int, after: str | None = None
+) -> list[RecordingSummary]:
+    """At most `limit` recordings of a session as they began, those after a certain one; raises NotFound."""
     session_row(transaction, session)
-    query = select(RecordingRow).where(RecordingRow.session_id == session).order_by(RecordingRow.key)
+    begun = 0 if after is None else recording_row(transaction, session, after).key
+    own = (RecordingRow.session_id == session) & (RecordingRow.key > begun)
+    query = select(RecordingRow).where(own).order_by(RecordingRow.key).limit(limit)
     return [summary(row) for row in transaction.scalars(query)]
 
 

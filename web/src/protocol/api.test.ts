@@ -32,3 +32,16 @@ it("says status and reason when an answer is no problem document", async () => {
 it("needs no body in the answer to a deletion", async () => {
   await expect(answering(null, 204).api.deleteSession("a")).resolves.toBeUndefined();
 });
+
+it("follows a list from page to page", async () => {
+  const pages = new Map([
+    ["/api/v1/sessions/a/curves?limit=500", '</api/v1/sessions/a/curves?limit=500&after=1>; rel="next"'],
+    ["/api/v1/sessions/a/curves?limit=500&after=1", undefined],
+  ]);
+  const fetcher = ((url: string) => {
+    const link = pages.get(url);
+    return Promise.resolve(new Response(JSON.stringify([{ index: url.length }]), { headers: link ? { link } : {} }));
+  }) as typeof fetch;
+  const found = await new Api("/api/v1", fetcher).curves("a");
+  expect(found.map((curve) => curve.index)).toEqual([...pages.keys()].map((url) => url.length));
+});

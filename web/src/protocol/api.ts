@@ -37,8 +37,8 @@ export class ApiProblem extends Error {
 
 type Body = string | Blob;
 
-/** As many sessions as the server lists at once. */
-const MOST_SESSIONS = 500;
+/** As many things as the server lists at once. */
+const PAGE = 500;
 
 /** The REST API of the server that sent this page. */
 export class Api {
@@ -65,7 +65,7 @@ export class Api {
   }
 
   sessions(): Promise<Session[]> {
-    return this.#json<Session[]>("GET", `/sessions?limit=${MOST_SESSIONS}`);
+    return this.#json<Session[]>("GET", `/sessions?limit=${PAGE}`);
   }
 
   session(id: string): Promise<Session> {
@@ -85,7 +85,7 @@ export class Api {
   }
 
   curves(session: string): Promise<Curve[]> {
-    return this.#json<Curve[]>("GET", `/sessions/${session}/curves`);
+    return this.#all<Curve>(`/sessions/${session}/curves`);
   }
 
   updateCurve(session: string, index: number, change: Partial<CurveUpdate>): Promise<Curve> {
@@ -93,7 +93,7 @@ export class Api {
   }
 
   recordings(session: string): Promise<RecordingSummary[]> {
-    return this.#json<RecordingSummary[]>("GET", `/sessions/${session}/recordings`);
+    return this.#all<RecordingSummary>(`/sessions/${session}/recordings`);
   }
 
   /** Have a recording corrected by a calibration of its device, or by none. */
@@ -169,6 +169,18 @@ export class Api {
   /** A JSON artifact by its URL. */
   async artifact<T>(url: string): Promise<T> {
     return (await (await this.#check(await this.fetcher(url))).json()) as T;
+  }
+
+  /** Every page of a list. */
+  async #all<T>(path: string): Promise<T[]> {
+    const found: T[] = [];
+    let next: string | undefined = `${path}?limit=${PAGE}`;
+    while (next !== undefined) {
+      const page = await this.#request("GET", next);
+      found.push(...((await page.json()) as T[]));
+      next = /<([^>]+)>; rel="next"/.exec(page.headers.get("link") ?? "")?.[1]?.slice(this.base.length);
+    }
+    return found;
   }
 
   async #json<T>(method: string, path: string, body?: Body): Promise<T> {

@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 
 from tracemesh.api.conditions import UseConditions
+from tracemesh.api.paging import UsePage
 from tracemesh.api.services import Reading, UseServices
 from tracemesh.storage import curves
 from tracemesh.storage.sessions import lock_session
@@ -16,9 +17,10 @@ Index = Annotated[int, Path(ge=0, le=2**31 - 1)]
 
 
 @router.get("")
-def list_all(session: Identifier, transaction: Reading) -> list[Curve]:
-    """In the order of scanning, less those that were removed."""
-    return curves.list_curves(transaction, session)
+def list_all(session: Identifier, transaction: Reading, page: UsePage) -> list[Curve]:
+    """In the order of scanning, less those that were removed; the `Link` header names the next page."""
+    found = curves.list_curves(transaction, session, page.limit, page.first)
+    return page.of(found, lambda curve: curve.index)
 
 
 @router.get("/{index}")

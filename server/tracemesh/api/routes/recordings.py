@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
+from tracemesh.api.paging import UsePage
 from tracemesh.api.services import IdempotencyKey, Reading, Services, UseServices
 from tracemesh.api.upload import file_body, parse_upload, read_body, store_upload
 from tracemesh.storage import recordings
@@ -18,9 +19,10 @@ router = APIRouter(prefix="/sessions/{session}/recordings", tags=["recordings"])
 
 
 @router.get("")
-def list_all(session: Identifier, transaction: Reading) -> list[RecordingSummary]:
-    """In the order in which they began."""
-    return recordings.list_recordings(transaction, session)
+def list_all(session: Identifier, transaction: Reading, page: UsePage) -> list[RecordingSummary]:
+    """In the order in which they began; the `Link` header names the next page."""
+    found = recordings.list_recordings(transaction, session, page.limit, page.after)
+    return page.of(found, lambda recording: recording.id)
 
 
 @router.get("/{recording}", response_class=StreamingResponse)
