@@ -4,10 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from sqlalchemy import bindparam, delete, func, insert, select, update
+from sqlalchemy import bindparam, delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from tracemesh.errors import Overtaken, Refused
+from tracemesh.storage.bulk import insert_all, update_each
 from tracemesh.storage.devices import add_calibration, corrected_hello, seen
 from tracemesh.storage.models import CurveRow, MarkRow, MessageRow, ReadingRow, RecordingRow, SessionRow, new_id
 from tracemesh.storage.states import CurveState, RecordingState, SessionState
@@ -104,34 +105,38 @@ def commit(session: Session, group: Group, owner: str = "") -> None:
     _number(session, group.readings)
     _reach(session, group, owner)
     connection = session.connection()
-    this_curve = (CurveRow.recording_key == bindparam("at_key")) & (CurveRow.number == bindparam("at_number"))
+    this_curve = {"at_key": CurveRow.recording_key, "at_number": CurveRow.number}
+    insert_all(connection, MessageRow, group.messages)
+    insert_all(connection, ReadingRow, group.readings)
     statements = (
-        (insert(MessageRow), group.messages),
         (insert(CurveRow), group.starts),
         (delete(MarkRow).where(*(getattr(MarkRow, name) == bindparam(f"at_{name}") for name in MARK)), group.unmarks),
         (insert(MarkRow), group.marks),
-        (update(CurveRow).where(this_curve), list(group.travelled.values())),
-        (update(CurveRow).where(this_curve), group.ends),
-        (insert(ReadingRow), group.readings),
     )
     for statement, rows in statements:
         if rows:
             connection.execute(statement, rows)
+    update_each(connection, CurveRow, this_curve, list(group.travelled.values()))
+    update_each(connection, CurveRow, this_curve, group.ends)
 
 
 def _lock_sessions(session: Session, rows: list[Row]) -> None:
     """No other server starts a curve or counts a reading in these sessions until this transaction ends."""
-    for identifier in sorted({row["session_id"] for row in rows}):  # all servers lock them in the same order
-        session.execute(select(SessionRow.id).where(SessionRow.id == identifier).with_for_update(key_share=True))
+    if identifiers := {row["session_id"] for row in rows}:
+        these = select(SessionRow.id).where(SessionRow.id.in_(identifiers))
+        # all servers lock them in the same order
+        session.execute(these.order_by(SessionRow.id).with_for_update(key_share=True)).all()
 
 
 def _number(session: Session, readings: list[Row]) -> None:
     """Go on from the last reading that is stored: another server may count those of the same session, too."""
-    for identifier in {row["session_id"] for row in readings}:
-        last = session.scalar(select(func.max(ReadingRow.index)).where(ReadingRow.session_id == identifier))
-        own = [row for row in readings if row["session_id"] == identifier]
-        for index, row in enumerate(own, 0 if last is None else last + 1):
-            row["index"] = index
+    if not readings:
+        return
+    of_these = ReadingRow.session_id.in_({row["session_id"] for row in readings})
+    last = select(ReadingRow.session_id, func.max(ReadingRow.index)).where(of_these).group_by(ReadingRow.session_id)
+    reached = dict(session.execute(last).all())
+    for row in readings:
+        row["index"] = reached[row["session_id"]] = reached.get(row["session_id"], -1) + 1
 
 
 def _check_indices(session: Session, starts: list[Row]) -> None:
@@ -147,9 +152,9 @@ def _check_indices(session: Session, starts: list[Row]) -> None:
 
 
 def _reach(session: Session, group: Group, owner: str) -> None:
-    own = (RecordingRow.key == bindparam("at_key")) & (RecordingRow.owner == bindparam("at_owner"))
+    own = {"at_key": RecordingRow.key, "at_owner": RecordingRow.owner}
     rows = [{**reached._asdict(), "at_owner": owner} for reached in group.reached.values()]
-    if rows and session.connection().execute(update(RecordingRow).where(own), rows).rowcount != len(rows):
+    if update_each(session.connection(), RecordingRow, own, rows) != len(rows):
         present = select(RecordingRow.key, RecordingRow.owner).where(RecordingRow.key.in_(group.reached))
         owners = dict(session.execute(present).all())
         raise Overtaken({key: _why_not(owners.get(key)) for key in group.reached if owners.get(key) != owner})
