@@ -1,6 +1,7 @@
 """Faces with several boundary loops: the right loops are joined, and the mesh has the right Euler number."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -148,6 +149,25 @@ def test_flat_plate_with_holes_is_flat_and_covers_its_area(holes: list[tuple[flo
     areas = [0.5 * np.cross(p, np.roll(p, -1, axis=0))[:, 2].sum() for p in polygons]
     outer, *inner = map(abs, areas)
     assert np.cross(b - a, c - a)[:, 2].sum() / 2 == pytest.approx(outer - sum(inner), rel=1e-4)
+
+
+def bent_plate(holes: Sequence[tuple[float, float, float]], along_y: float) -> CurveNetwork:
+    """A plate with holes bent to z = along_y y^2 - x^2: a dome for -1, a saddle for 1."""
+    flat = plate(holes)
+    x, y, _ = flat.points.T
+    height, slopes = along_y * y**2 - x**2, np.column_stack([2 * x, -2 * along_y * y, np.ones_like(x)])
+    return replace(flat, points=np.column_stack([x, y, height]), normals=radial(slopes))
+
+
+@pytest.mark.parametrize("along_y", [-1.0, 1.0], ids=["dome", "saddle"])
+@pytest.mark.parametrize(
+    "holes",
+    [[(-0.4, 0.0, 0.25), (0.4, 0.0, 0.25)], [(-0.6, 0.0, 0.08), (0.0, 0.6, 0.1), (0.5, -0.4, 0.12)]],
+    ids=["two", "three"],
+)
+def test_holes_in_what_cannot_be_unrolled(holes: list[tuple[float, float, float]], along_y: float) -> None:
+    """Steep at the rim, and curved both ways: the sides of a slit that was cut open cross in the plane."""
+    sound(bent_plate(holes, along_y), 1 - len(holes), 1 + len(holes))
 
 
 def test_plate_with_filled_circles_is_a_disk() -> None:

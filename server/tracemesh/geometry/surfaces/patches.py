@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def triangulate_patches(
     average normals. Raises SurfaceError, naming the patch, if one cannot be triangulated.
     """
     network, outlines = complex_.network, outlines_of(complex_)
-    unrolled = [None] * len(outlines) if last is None else _unrolled_loops(outlines, *last)
+    unrolled = [()] * len(outlines) if last is None else _unrolled_loops(outlines, *last)
     pieces = [
         _triangulate(network, outline, spacing, coarsening, loop)
         for outline, loop in zip(outlines, unrolled, strict=True)
@@ -168,14 +169,23 @@ def _lift(outline: Outline) -> Floats:
     return normalised(np.cross(outline.points, np.roll(outline.points, -1, axis=0)).sum(0))
 
 
-def _unrolled_loops(outlines: list[Outline], patches: PatchMesh, vertices: Floats) -> list[Floats | None]:
-    """Boundaries of all patches, unrolled from space into the plane."""
-    planar = flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)
-    return [planar[start : start + len(o.points)] for start, o in zip(patches.starts, outlines, strict=True)]
+def _unrolled_loops(outlines: list[Outline], patches: PatchMesh, vertices: Floats) -> list[tuple[Floats, ...]]:
+    """Boundaries of all patches, unrolled from space into the plane: cut open at slits, and with the slits sewn up.
+
+    A band opens as a cylinder does; around a hole in a dome the sides of a slit would cross.
+    """
+    ways = [flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)]
+    patch = np.repeat(np.arange(len(outlines)), np.diff(np.append(patches.starts, len(patches.vertex))))
+    _, first, place = np.unique(patch * patches.count + patches.vertex, return_index=True, return_inverse=True)
+    if len(first) < len(patches.vertex):
+        sewn, faces = patches.vertex[first], place[patches.planar_faces]
+        ways.append(flatten(vertices[sewn], faces, patches.planar[first], place[patches.starts])[place])
+    ends = [slice(start, start + len(o.points)) for start, o in zip(patches.starts, outlines, strict=True)]
+    return [tuple(planar[own] for planar in ways) for own in ends]
 
 
 def _triangulate(
-    network: CurveNetwork, outline: Outline, spacing: float | None, coarsening: float, unrolled: Floats | None
+    network: CurveNetwork, outline: Outline, spacing: float | None, coarsening: float, unrolled: tuple[Floats, ...]
 ) -> tuple[Floats, Floats, Ints]:
     """Loop in the plane, interior points and faces of one patch; the first map to the plane that is injective."""
     points, normals = outline.points, outline.normals
@@ -183,7 +193,7 @@ def _triangulate(
     reason = "its boundary turns the wrong way"
     whole = len(np.unique(outline.vertex)) == len(points)  # else its walk begins at a slit, wherever its curves do
     maps: tuple[Callable[[], Floats | None], ...] = (
-        lambda: unrolled,
+        *(partial(np.asarray, loop) for loop in unrolled),
         lambda: project_to_plane(points, normals),
         lambda: turned(develop(points, normals), points) if whole else develop(points, normals),
         lambda: turned(map_to_circle(points), points) if whole else map_to_circle(points),
