@@ -16,7 +16,7 @@ from tracemesh.formats.recordings import recording_from_scan
 from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
 from tracemesh.storage.database import Database
-from tracemesh.storage.ingest import Group, commit, open_recording
+from tracemesh.storage.ingest import record
 from tracemesh.storage.sessions import create_session
 from tracemesh.wire.resources import Reconstruction, SessionCreate
 
@@ -99,11 +99,8 @@ def database(settings: Settings, shared_data: Path) -> Iterator[Database]:
     with database.write() as transaction:
         create_session(transaction, SessionCreate(id="s"))
         create_session(transaction, SessionCreate(id="empty"))
-        state, group = open_recording(transaction, sent.hello, sent.hello.model_dump_json().encode()), Group()
-        for message in sent.messages:
-            state.advance(message, 1)
-            group.add(state, message, message.model_dump_json(exclude_none=True).encode())
-        commit(transaction, group)
+        lines = [(message, message.model_dump_json(exclude_none=True).encode()) for message in sent.messages]
+        record(transaction, sent.hello, sent.hello.model_dump_json().encode(), lines)
     yield database
     database.close()
 
