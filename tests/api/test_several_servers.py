@@ -41,9 +41,10 @@ def watch() -> Iterator[Callable[..., Callable[..., list[dict[str, Any]]]]]:
         yield begin
 
 
-def deliver(servers: list[Any], session: str, recording: str, messages: list[dict[str, Any]]) -> None:
+def deliver(servers: list[Any], session: str, recording: str, messages: list[dict[str, Any]], **of_device: Any) -> None:
     """Send a recording as a bridge does, at another server whenever a connection ends."""
-    hello = {"type": "hello", "recording": recording, "session": session, "device": {"id": "d", "kind": "test"}}
+    device = {"id": "d", "kind": "test", **of_device}
+    hello = {"type": "hello", "recording": recording, "session": session, "device": device}
     acknowledged, attempt = -1, 0
     while acknowledged < len(messages) - 1:
         with suppress(ConnectionClosed, OSError), servers[attempt % len(servers)].connect("/ingest") as socket:
@@ -117,12 +118,18 @@ def test_edits_and_progress_at_one_server_are_seen_at_the_other(team: Any, line:
 def test_devices_at_both_servers_draw_into_one_session(
     kind: str, start_processes: Any, new_database: Any, tmp_path: Path, line: Any
 ) -> None:
-    """No two curves get one index, whoever starts them; everything is stored once and in order, on SQLite, too."""
+    """No two curves or readings get one number, whoever counts; all is stored once and in order, on SQLite too."""
     team = start_processes(2, tmp_path, new_database(kind))
     session = team[0].new_session()
     messages = rides(line, 15)
-    with ThreadPoolExecutor(2) as devices:
+    readings = [{"type": "reading", "seq": n, "time": n / 50, "quaternion": [[1, 0, 0, 0]] * 2} for n in range(300)]
+    ribbon = {"curves": [{"sensors": [0, 1], "spacing": [0.1]}]}
+    with ThreadPoolExecutor(4) as devices:
         sent = [devices.submit(deliver, [server], session, f"at-{server.port}", messages) for server in team]
+        sent += [
+            devices.submit(deliver, [server], session, f"array-{server.port}", readings, array=ribbon)
+            for server in team
+        ]
         for one in sent:
             one.result()
     curves = team[0].http.get(f"/sessions/{session}/curves").json()
@@ -130,6 +137,10 @@ def test_devices_at_both_servers_draw_into_one_session(
     assert all(c["samples"] == 20 for c in curves)
     for server in team:
         assert stored(team[0], session, f"at-{server.port}") == messages
+        assert stored(team[0], session, f"array-{server.port}") == readings
+    counted = team[1].http.get(f"/sessions/{session}/readings", params={"limit": 1000}).json()
+    assert counted["count"] == 600
+    assert sorted(counted["times"]) == sorted(2 * [reading["time"] for reading in readings])
 
 
 def test_a_device_may_go_on_at_the_other_server(team: Any, line: Any, ride_at: Any) -> None:

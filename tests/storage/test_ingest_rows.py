@@ -12,10 +12,12 @@ from tracemesh.errors import Overtaken, Refused
 from tracemesh.storage.curves import list_curves
 from tracemesh.storage.database import Database
 from tracemesh.storage.ingest import Group, commit, open_recording
-from tracemesh.storage.models import MessageRow, RecordingRow, new_id
+from tracemesh.storage.models import MessageRow, RecordingRow, SessionRow, new_id
+from tracemesh.storage.readings import list_readings
 from tracemesh.storage.recordings import recording_messages, recording_row
 from tracemesh.storage.sessions import delete_session
 from tracemesh.storage.states import RecordingState
+from tracemesh.wire.arrays import ArrayCurve, ArrayReading, SensorArray
 from tracemesh.wire.base import Count
 from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Recorded, Samples, Wheel
 
@@ -224,3 +226,25 @@ def test_a_deleted_recording_is_told_to_whoever_still_sends_it(database: Databas
     with pytest.raises(Overtaken) as overtaken, database.write() as transaction:
         commit(transaction, started(state), "first")
     assert overtaken.value.reasons[state.key].code == "unknown"
+
+
+def test_servers_count_the_readings_of_one_session_together(database: Database) -> None:
+    """Each goes on from what is stored, not from what it counted itself."""
+    ribbon = SensorArray(curves=[ArrayCurve(sensors=[0, 1], spacing=[0.1])])
+    session, states = new_id(), {}
+    with database.write() as transaction:
+        transaction.add(SessionRow(id=session, name=""))
+    for owner in ("here", "there"):
+        hello = Hello(recording=owner, session=session, device=Device(id="d", kind="k", array=ribbon))
+        with database.write() as transaction:
+            states[owner] = open_recording(transaction, hello, hello.model_dump_json().encode(), owner)
+    for time in range(6):
+        owner = "here" if time % 2 else "there"
+        group, state = Group(), states[owner]
+        reading = ArrayReading(seq=state.next_seq, time=time, quaternion=[(1.0, 0.0, 0.0, 0.0)] * 2)
+        state.advance(reading, 2)
+        group.add(state, reading, b"{}")
+        with database.write() as transaction:
+            commit(transaction, group, owner)
+    with database.read() as transaction:
+        assert list_readings(transaction, session, 0, 10).times == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
