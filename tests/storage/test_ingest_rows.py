@@ -1,6 +1,7 @@
 """Laws of ingest: what is stored does not depend on how it was grouped, nor on restarts in between."""
 
 from dataclasses import asdict
+from threading import Thread
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -9,17 +10,18 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from tracemesh.errors import Overtaken, Refused
-from tracemesh.storage.curves import list_curves
+from tracemesh.storage.curves import get_curve, list_curves, update_curve
 from tracemesh.storage.database import Database
 from tracemesh.storage.ingest import Group, commit, open_recording
 from tracemesh.storage.models import MessageRow, RecordingRow, SessionRow, new_id
 from tracemesh.storage.readings import list_readings
 from tracemesh.storage.recordings import recording_messages, recording_row
-from tracemesh.storage.sessions import delete_session
+from tracemesh.storage.sessions import delete_session, lock_session
 from tracemesh.storage.states import RecordingState
 from tracemesh.wire.arrays import ArrayCurve, ArrayReading, SensorArray
 from tracemesh.wire.base import Count
 from tracemesh.wire.device import CurveEnd, CurveStart, Device, Hello, NodeMark, Recorded, Samples, Wheel
+from tracemesh.wire.resources import CurveUpdate, Mark
 
 HELLO = Hello(recording="r", device=Device(id="d", kind="test", wheel=Wheel(circumference=0.1, ticks_per_turn=500)))
 FLAT = {"tangent": [(1.0, 0.0, 0.0)], "normal": [(0.0, 0.0, 1.0)]}
@@ -248,3 +250,31 @@ def test_servers_count_the_readings_of_one_session_together(database: Database) 
             commit(transaction, group, owner)
     with database.read() as transaction:
         assert list_readings(transaction, session, 0, 10).times == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_a_mark_of_the_device_and_an_edit_of_the_page_are_both_kept(database: Database) -> None:
+    """Whoever edits marks has seen all that there are: a device's next one waits until the edit is stored."""
+    ride: list[Recorded] = [
+        CurveStart(seq=0, curve=0),
+        Samples(seq=1, curve=0, first_sample=0, **{name: 3 * column for name, column in FLAT.items()}),
+    ]
+    state = store(database, HELLO, ride, [2], restart=False)
+    mark, group = NodeMark(seq=2, curve=0, sample=2, node=7), Group()
+    state.advance(mark, 2)
+    group.add(state, mark, b"{}")
+
+    def record() -> None:
+        with database.write() as transaction:
+            commit(transaction, group)
+
+    device = Thread(target=record)
+    with database.write() as transaction:
+        lock_session(transaction, state.session.id)
+        assert get_curve(transaction, state.session.id, 0).marks == []
+        device.start()
+        device.join(0.5)  # enough for it where nothing holds it up
+        update_curve(transaction, state.session.id, 0, CurveUpdate(marks=[Mark(sample=0, node=1)]))
+    device.join()
+    with database.read() as transaction:
+        kept = get_curve(transaction, state.session.id, 0).marks
+    assert [(mark.sample, mark.node) for mark in kept] == [(0, 1), (2, 7)]

@@ -41,6 +41,8 @@ class Group:
     readings: list[Row] = field(default_factory=list)
     travelled: dict[tuple[int, int], Row] = field(default_factory=dict)
     reached: dict[int, Reached] = field(default_factory=dict)
+    marked: dict[int, str] = field(default_factory=dict)
+    """Sessions of the recordings whose marks change."""
 
     def add(self, state: RecordingState, message: Recorded, payload: bytes) -> None:
         """Take a message that `state` has just advanced over."""
@@ -62,6 +64,7 @@ class Group:
             index = state.curves[number].index
             self.starts.append({**row, "session_id": state.session.id, "index": index, "boundary": message.boundary})
         elif isinstance(message, NodeMark):
+            self.marked[key] = state.session.id
             self._mark({**row, "sample": message.sample, "node": message.node}, message.undo)
         elif isinstance(message, CurveEnd):
             self.ends.append({**curve, "closed": message.closed, "removed": message.discard, "ended": True})
@@ -93,6 +96,7 @@ class Group:
         for curve in [curve for curve in self.travelled if curve[0] == key]:
             del self.travelled[curve]
         self.reached.pop(key, None)
+        self.marked.pop(key, None)
 
 
 def commit(session: Session, group: Group, owner: str = "") -> None:
@@ -100,7 +104,7 @@ def commit(session: Session, group: Group, owner: str = "") -> None:
 
     Raises Overtaken when another server than `owner` has a recording now, or gave a new curve's index away.
     """
-    _lock_sessions(session, [*group.starts, *group.readings])
+    _lock_sessions(session, {row["session_id"] for row in [*group.starts, *group.readings]} | {*group.marked.values()})
     _check_indices(session, group.starts)
     _number(session, group.readings)
     _reach(session, group, owner)
@@ -120,9 +124,9 @@ def commit(session: Session, group: Group, owner: str = "") -> None:
     update_each(connection, CurveRow, this_curve, group.ends)
 
 
-def _lock_sessions(session: Session, rows: list[Row]) -> None:
-    """No other server starts a curve or counts a reading in these sessions until this transaction ends."""
-    if identifiers := {row["session_id"] for row in rows}:
+def _lock_sessions(session: Session, identifiers: set[str]) -> None:
+    """Nobody starts a curve, counts a reading or edits marks in these sessions until this transaction ends."""
+    if identifiers:
         these = select(SessionRow.id).where(SessionRow.id.in_(identifiers))
         # all servers lock them in the same order
         session.execute(these.order_by(SessionRow.id).with_for_update(key_share=True)).all()
