@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -36,6 +37,12 @@ class Server:
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment,
         )  # fmt: skip
 
+    def fill_disk(self):
+        """From now on no byte can be written; returns what makes room again."""
+        before = resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE, (1, before[1]))
+        return lambda: resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE, before)
+
     def kill(self):
         self._process.kill()
         self._process.wait()
@@ -63,6 +70,33 @@ def frames(lines):
     ]
 
 
+def only_recording(server):
+    (session,) = json.loads(server.get("/sessions"))
+    recordings = f"/sessions/{session['id']}/recordings"
+    (recording,) = json.loads(server.get(recordings))
+    return server.get(f"{recordings}/{recording['id']}").splitlines()
+
+
+def test_a_full_disk_at_the_server_costs_nothing(bench, real_server, eventually):
+    bench.virtual()
+    bridge = bench.bridge()
+    bridge.says("server: live")
+    bridge.says("device: live")
+    bridge.type("-")
+    bench.samples(50)
+    make_room = real_server.fill_disk()
+    bridge.says("cannot store messages now")
+    bench.samples(100)
+    make_room()
+    eventually(lambda: bridge.said.count("server: live") == 2)
+    bench.samples(50)
+    bridge.type("*q")
+    assert bridge.wait() == 0
+    places = [bench.sent().index(frame) for frame in frames(only_recording(real_server))]
+    assert len(places) >= 200
+    assert places == list(range(places[0], places[-1] + 1))
+
+
 def test_server_and_bridge_killed_in_mid_curve(bench, real_server):
     bench.virtual()
     bridge = bench.bridge()
@@ -82,10 +116,7 @@ def test_server_and_bridge_killed_in_mid_curve(bench, real_server):
     bench.samples(50)
     bridge.type("*q")
     assert bridge.wait() == 0
-    (session,) = json.loads(real_server.get("/sessions"))
-    recordings = f"/sessions/{session['id']}/recordings"
-    (recording,) = json.loads(real_server.get(recordings))
-    stored = real_server.get(f"{recordings}/{recording['id']}").splitlines()
+    stored = only_recording(real_server)
     places = [bench.sent().index(frame) for frame in frames(stored)]
     assert places == sorted(set(places))
     assert places[-1] - places[0] + 1 - len(places) <= 1, "only the answer on its way when the bridge was killed"
