@@ -6,7 +6,7 @@ WEB_SOURCES := $(shell find web -path web/node_modules -prune -o -type f -print 
 PAGE := server/tracemesh/web/index.html
 export OPENBLAS_NUM_THREADS ?= 2
 
-.PHONY: help setup demo test check bench clean
+.PHONY: help setup demo test check check-python check-web bench clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
@@ -21,10 +21,14 @@ test: setup .make/browser .make/postgresql  ## every test, the browser's include
 	$(BIN)/python -m pytest -n 3 --dist loadgroup
 
 check: check-python check-web  ## formatting, lint, types, import rules
+
+check-python: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+
+check-web: setup
 	cd web && npm run check
 
 bench: export OPENBLAS_NUM_THREADS = 1
