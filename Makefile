@@ -18,7 +18,7 @@ demo: setup  ## watch a virtual Morphorider scan, become a network, become a sur
 
 test: setup .make/browser .make/postgresql  ## every test, the browser's included
 	cd web && npm test
-	$(BIN)/python -m pytest -n 3 --dist loadgroup
+	$(BIN)/python -m pytest -n 3
 
 check: check-python check-web  ## formatting, lint, types, import rules
 

@@ -18,8 +18,27 @@ from uuid import uuid4
 import httpx
 import pytest
 from sqlalchemy import create_engine
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+class Together(LoadScopeScheduling):
+    """Tests one by one to whoever is free, but for those that share something dear: they stay together, and go first.
+
+    Browsers that draw in software starve each other, and one dask cluster is enough.
+    """
+
+    def _split_scope(self, nodeid: str) -> str:
+        if nodeid.startswith("tests/web/"):
+            return "browser"
+        return "dask" if nodeid.startswith("tests/jobs/") and "dask" in nodeid else nodeid
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Together:
+    """How pytest-xdist gives tests out."""
+    return Together(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -130,10 +130,3 @@ def quick_lease(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is lost is found soon."""
     monkeypatch.setattr("tracemesh.jobs.runner.LEASE", 1.5)
     monkeypatch.setattr("tracemesh.jobs.runner.BEAT", 0.2)
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """One process of pytest-xdist has the cluster, and so all of these tests."""
-    for item in items:
-        if "tests/jobs" in str(item.path) and "dask" in item.nodeid:
-            item.add_marker(pytest.mark.xdist_group("dask"))

@@ -69,10 +69,3 @@ def rider(server: Server) -> Iterator[Callable[[str], Rider]]:
             return Rider(connection, recording_from_simulation(curves, f"ride-{session}", session))
 
         yield start
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """One process of pytest-xdist has the browser: several that draw in software starve each other."""
-    for item in items:
-        if "tests/web" in str(item.path):
-            item.add_marker(pytest.mark.xdist_group("browser"))
