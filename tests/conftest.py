@@ -89,7 +89,7 @@ def postgresql() -> Iterator[PostgreSql]:
 
 @pytest.fixture
 def torn_connections() -> Iterator[None]:
-    """For who tears connections to PostgreSQL: pg8000 leaves their sockets to the garbage collector, which warns."""
+    """For who tears connections: pg8000 and dask leave their sockets to the garbage collector, which warns."""
     warnings.filterwarnings("ignore", "unclosed <socket", ResourceWarning)
     yield
     gc.collect()

@@ -15,6 +15,7 @@ from tracemesh.settings import Settings
 from tracemesh.storage.database import Database
 
 pytestmark = [
+    pytest.mark.usefixtures("torn_connections"),
     pytest.mark.parametrize("database_url", ["sqlite"], indirect=True),
     pytest.mark.parametrize("executor", ["dask"], indirect=True),
 ]
