@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from tests.conftest import ROOT
 from tracemesh.storage.database import Database
 from tracemesh.storage.sessions import list_sessions
 
@@ -107,7 +108,7 @@ def _damage_leaves_nothing(server: Any, archive: bytes) -> None:
 KILLED = """
 import os, sys
 from pathlib import Path
-from sqlalchemy import event
+from tests.killing import kill_before
 from tracemesh.api.routes.archives import restored
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import open_artifacts
@@ -115,16 +116,9 @@ from tracemesh.storage.database import Database
 
 settings = Settings(database_url=sys.argv[1], data_dir=Path(sys.argv[2]))
 
-def take_in(left):
+def take_in(statements):
     database = Database(settings.resolved_database_url)
-
-    @event.listens_for(database.engine, "before_cursor_execute")
-    def count(*_):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            os.kill(os.getpid(), 9)
-
+    kill_before(database, statements)
     with open(sys.argv[3], "rb") as file:
         restored(database, open_artifacts(settings), file, 10**9, "derived")
 
@@ -147,7 +141,7 @@ def test_a_restore_that_is_killed_leaves_nothing_and_asking_again_makes_it_whole
 
     def run(*statements: int) -> list[int]:
         command = [sys.executable, "-c", KILLED, url, tmp_path, archive, *map(str, statements)]
-        done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+        done = subprocess.run(command, stdout=subprocess.PIPE, check=True, cwd=ROOT)
         return list(map(int, done.stdout.split()))
 
     def known() -> list[tuple[int, int]]:

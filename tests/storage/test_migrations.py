@@ -12,6 +12,7 @@ import pytest
 from alembic.script import ScriptDirectory
 from sqlalchemy import Column, Connection, MetaData, event, select
 
+from tests.conftest import ROOT
 from tracemesh.storage.database import Database, migrations, newest_revision
 from tracemesh.storage.devices import list_devices
 from tracemesh.storage.models import SessionRow
@@ -20,19 +21,12 @@ REVISIONS = [script.revision for script in ScriptDirectory.from_config(migration
 VALUES: dict[type, Any] = {str: "x", int: 3, float: 0.5, bool: True, bytes: b"{}", object: {"a": 1}}
 
 KILLED = """
-import os, sys
-from sqlalchemy import event
+import sys
+from tests.killing import kill_before
 from tracemesh.storage.database import Database
 
-database, left = Database(sys.argv[1]), int(sys.argv[2])
-
-@event.listens_for(database.engine, "before_cursor_execute")
-def count(*_):
-    global left
-    left -= 1
-    if left < 0:
-        os.kill(os.getpid(), 9)
-
+database = Database(sys.argv[1])
+kill_before(database, int(sys.argv[2]))
 database.migrate()
 """
 """Migrates a database and kills itself before a certain statement."""
@@ -114,7 +108,7 @@ def test_whoever_is_killed_in_a_migration_leaves_the_schema_as_it_was(
         fill(connection)
     total = statements(trial)
     for survived in (total // 3, 2 * total // 3, total - 1):
-        killed = subprocess.run([sys.executable, "-c", KILLED, url, str(survived)])
+        killed = subprocess.run([sys.executable, "-c", KILLED, url, str(survived)], cwd=ROOT)
         assert killed.returncode == -signal.SIGKILL
         assert database.versions()[0] == first
     database.migrate()
