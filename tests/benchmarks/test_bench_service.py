@@ -32,7 +32,10 @@ def test_what_a_session_costs() -> None:
     assert row(table, 1)["processor time, s"] > 0
 
 
-def test_a_server_that_knows_its_folder_is_the_same_server() -> None:
+def test_starts_of_servers_and_workers() -> None:
+    """A server that knows its folder is the same server; a further worker is a copy that owns little."""
     table = starts(Data(None), count=1)
-    assert len(table.rows) == 2
-    assert all(float(row[2] or 0) > 0 and float(row[3] or 0) > 20 for row in table.rows)
+    new, known, first, further = table.rows
+    assert all(float(row[2] or 0) > 0 and float(row[3] or 0) > 20 for row in (new, known))
+    assert float(first[1] or 0) > 0 < float(further[1] or 0)
+    assert 0 < float(further[3] or 0) < float(new[3] or 0)

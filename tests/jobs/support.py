@@ -68,13 +68,23 @@ def _children(parent: int) -> list[int]:
 
 
 def workers(parent: int | None = None) -> list[int]:
-    """Worker processes that a process started; multiprocessing's own resource tracker is none."""
-    return [pid for pid in _children(parent or os.getpid()) if "spawn_main" in _command(pid)]
+    """Worker processes that a process started, or had copied; multiprocessing's own helpers are none."""
+    copied = [pid for origin in origins(parent) for pid in _children(origin)]
+    return copied + [pid for pid in _children(parent or os.getpid()) if "spawn_main" in _command(pid)]
+
+
+def origins(parent: int | None = None) -> list[int]:
+    """The process that a process has its workers copied from, if there is one yet."""
+    return [pid for pid in _children(parent or os.getpid()) if "forkserver" in _command(pid)]
 
 
 def kill(pids: list[int]) -> None:
     for pid in pids:
         os.kill(pid, signal.SIGKILL)
+    wait_for_end(pids)
+
+
+def wait_for_end(pids: list[int]) -> None:
     until(lambda: not any(_command(pid) for pid in pids))
 
 

@@ -13,7 +13,6 @@ from tests.jobs.support import LONG, kill, look, queue, row, until, wait, wait_u
 from tracemesh.formats.meshes import read_mesh
 from tracemesh.formats.networks import read_network
 from tracemesh.jobs.runner import JobRunner
-from tracemesh.jobs.slot import Slot
 from tracemesh.settings import Settings
 from tracemesh.storage.artifacts import artifact_row, open_artifacts
 from tracemesh.storage.database import Database
@@ -23,10 +22,7 @@ from tracemesh.storage.sessions import delete_session
 from tracemesh.wire.resources import Reconstruction
 
 Start = Callable[..., JobRunner]
-on_sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
-"""For what does not depend on the kind of database; the rows themselves are tested on both in tests/storage."""
 embedded = pytest.mark.parametrize("executor", ["embedded"], indirect=True)
-on_dask = pytest.mark.parametrize("executor", ["dask"], indirect=True)
 
 
 def test_a_job_leaves_its_files_and_tells_how_far_it_is(
@@ -56,7 +52,6 @@ def test_two_servers_share_the_jobs(start: Start, database: Database) -> None:
     assert {row(database, job).attempt for job in jobs} == {1}
 
 
-@on_sqlite
 @embedded
 def test_a_job_runs_in_the_worker_that_was_prepared_for_it(start: Start, database: Database) -> None:
     runner = start()
@@ -68,7 +63,6 @@ def test_a_job_runs_in_the_worker_that_was_prepared_for_it(start: Start, databas
     assert workers() == prepared
 
 
-@on_sqlite
 @embedded
 def test_an_interrupt_at_the_terminal_leaves_workers_to_the_server(start: Start, database: Database) -> None:
     start()
@@ -80,7 +74,6 @@ def test_an_interrupt_at_the_terminal_leaves_workers_to_the_server(start: Start,
         assert workers() == before
 
 
-@on_sqlite
 @embedded
 def test_a_closed_runner_starts_no_worker(start: Start) -> None:
     runner = start()
@@ -89,7 +82,6 @@ def test_a_closed_runner_starts_no_worker(start: Start) -> None:
     assert workers() == []
 
 
-@on_sqlite
 def test_what_cannot_be_reconstructed_says_why(start: Start, database: Database) -> None:
     job = queue(database, "empty")
     start()
@@ -97,7 +89,6 @@ def test_what_cannot_be_reconstructed_says_why(start: Start, database: Database)
     assert (failed.state, failed.error) == ("failed", "session empty has no curve with samples")
 
 
-@on_sqlite
 @embedded
 def test_a_killed_worker_costs_an_attempt_not_the_job(start: Start, database: Database) -> None:
     start()
@@ -109,7 +100,6 @@ def test_a_killed_worker_costs_an_attempt_not_the_job(start: Start, database: Da
     assert (row(database, job).attempt, row(database, job).losses) == (2, 1)
 
 
-@on_sqlite
 @embedded
 def test_a_job_that_kills_every_worker_fails_in_words(start: Start, database: Database) -> None:
     job = queue(database, step=LONG)
@@ -120,7 +110,6 @@ def test_a_job_that_kills_every_worker_fails_in_words(start: Start, database: Da
     assert wait(database, job).error == "its process was lost 2 times"
 
 
-@on_sqlite
 def test_a_running_job_is_cancelled_between_stages(start: Start, database: Database) -> None:
     job = queue(database, step=LONG)
     start()
@@ -131,7 +120,6 @@ def test_a_running_job_is_cancelled_between_stages(start: Start, database: Datab
     assert (cancelled.state, cancelled.artifacts) == ("cancelled", {})
 
 
-@on_sqlite
 def test_a_job_that_takes_too_long_fails_in_words_and_frees_its_worker(start: Start, database: Database) -> None:
     job, after = queue(database, step=LONG), queue(database)
     runner = start(job_timeout=1)
@@ -142,17 +130,6 @@ def test_a_job_that_takes_too_long_fails_in_words_and_frees_its_worker(start: St
     assert wait(database, after).state in ("done", "failed")
 
 
-def test_a_process_has_no_more_memory_than_it_may_take() -> None:
-    slot = Slot(memory=2**29)
-    try:
-        with pytest.raises(MemoryError):
-            slot.submit(bytearray, 2**29).result()
-        assert slot.submit(len, b"goes on").result() == 7
-    finally:
-        slot.close()
-
-
-@on_sqlite
 @embedded
 def test_a_job_that_needs_too_much_memory_fails_in_words(start: Start, database: Database) -> None:
     job = queue(database, step="0.002%")
@@ -160,7 +137,6 @@ def test_a_job_that_needs_too_much_memory_fails_in_words(start: Start, database:
     assert wait(database, job).error == "it needs more memory than there is"
 
 
-@on_sqlite
 @embedded
 def test_who_waits_for_a_job_does_not_wait_for_batches(start: Start, database: Database) -> None:
     batch = [queue(database) for _ in range(3)]
@@ -185,7 +161,6 @@ def test_what_a_lost_server_left_is_taken_up(start: Start, database: Database) -
     assert (row(database, lost).attempt, row(database, waiting).attempt) == (2, 1)
 
 
-@on_sqlite
 @embedded
 @pytest.mark.usefixtures("quick_lease")
 def test_a_server_that_comes_later_leaves_what_another_one_runs(start: Start, database: Database) -> None:
@@ -197,7 +172,6 @@ def test_a_server_that_comes_later_leaves_what_another_one_runs(start: Start, da
     assert row(database, job).attempt == 1
 
 
-@on_sqlite
 def test_closing_gives_jobs_up_and_the_next_start_goes_on(start: Start, database: Database) -> None:
     job, runner = queue(database, step=LONG), start()
     wait_until_it_works(database, job)
@@ -208,7 +182,6 @@ def test_closing_gives_jobs_up_and_the_next_start_goes_on(start: Start, database
     assert wait(database, job).state == "done"
 
 
-@on_sqlite
 def test_a_session_deleted_under_its_job_harms_nobody(start: Start, database: Database) -> None:
     job = queue(database, step=LONG)
     start()
@@ -218,7 +191,6 @@ def test_a_session_deleted_under_its_job_harms_nobody(start: Start, database: Da
     assert wait(database, queue(database, "empty")).state == "failed"
 
 
-@on_sqlite
 def test_an_artifact_store_that_is_away_is_told(start: Start, settings: Settings, database: Database) -> None:
     """Where its folder should be is a file; once that is gone, the same wish is granted."""
     start()
