@@ -2,6 +2,7 @@
 
 import gc
 import os
+import resource
 import shutil
 import socket
 import subprocess
@@ -10,9 +11,11 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 import httpx
@@ -51,10 +54,23 @@ def shared_data() -> Path:
 
 @dataclass(frozen=True)
 class PostgreSql:
-    """A real PostgreSQL: its URL, less a database's name, and what restarts it as after a crash."""
+    """A real PostgreSQL: its URL, less a database's name, and what restarts it as after a crash, with options."""
 
     url: str
-    crash: Callable[[], None]
+    restart: Callable[..., None]
+
+    def crash(self) -> None:
+        self.restart()
+
+    @contextmanager
+    def no_file_beyond(self, size: int) -> Iterator[None]:
+        """No file of it grows beyond so many bytes meanwhile, as on a full disk."""
+        limits = size, resource.RLIM_INFINITY
+        self.restart(preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limits))
+        try:
+            yield
+        finally:
+            self.restart()
 
 
 @pytest.fixture(scope="session")
@@ -71,18 +87,18 @@ def postgresql() -> Iterator[PostgreSql]:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
 
-    def run(program: str, *arguments: str) -> None:
+    def run(program: str, *arguments: str, **options: Any) -> None:
         command = [programs[0] / program, "-D", folder / "data", *arguments]
-        done = subprocess.run(command, user=user, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        told = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        done = subprocess.run(command, user=user, cwd=folder, **told, **options)
         assert done.returncode == 0, done.stderr.decode()
 
-    run("initdb", "-U", "tracemesh", "-A", "trust", "--no-sync", "-E", "UTF8")
+    run("initdb", "-U", "tracemesh", "-A", "trust", "--no-sync", "-E", "UTF8", "--wal-segsize", "1")
     options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories= -c fsync=off"
     start = ("-w", "-o", options, "-l", str(folder / "log"))
     run("pg_ctl", *start, "start")
-    yield PostgreSql(
-        f"postgresql+pg8000://tracemesh@127.0.0.1:{port}", lambda: run("pg_ctl", *start, "-m", "immediate", "restart")
-    )
+    url = f"postgresql+pg8000://tracemesh@127.0.0.1:{port}"
+    yield PostgreSql(url, partial(run, "pg_ctl", *start, "-m", "immediate", "restart"))
     run("pg_ctl", "-w", "-m", "immediate", "stop")
     shutil.rmtree(folder)
 

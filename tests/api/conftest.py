@@ -129,6 +129,7 @@ class ServerProcess:
     """A server that can be killed and started again on the same data."""
 
     data_dir: Path
+    database_url: str | None = None
     port: int = field(default_factory=free_port)
     process: subprocess.Popen[bytes] | None = None
     client: RunningServer | None = None
@@ -136,7 +137,8 @@ class ServerProcess:
     def start(self, host: str = "127.0.0.1", **options: Any) -> RunningServer:
         command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(self.port), "--data-dir", self.data_dir]
         command += ["--host", host]
-        self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL, **options)
+        database = {"TRACEMESH_DATABASE_URL": self.database_url} if self.database_url else {}
+        self.process = subprocess.Popen(command, stderr=subprocess.DEVNULL, env={**os.environ, **database}, **options)
         self._hang_up()
         client = self.client = RunningServer(self.port, pid=self.process.pid)
         give_up = time.monotonic() + PATIENCE
@@ -167,19 +169,26 @@ def start_processes() -> Iterator[Callable[..., list[RunningServer]]]:
     with ExitStack() as stack:
 
         def start(count: int, folder: Path, database_url: str) -> list[RunningServer]:
-            processes = [ServerProcess(folder) for _ in range(count)]
+            processes = [ServerProcess(folder, database_url) for _ in range(count)]
             for process in processes:
                 stack.callback(process.kill)
-            environment = {**os.environ, "TRACEMESH_DATABASE_URL": database_url}
-            return [process.start(env=environment) for process in processes]
+            return [process.start() for process in processes]
 
         yield start
 
 
 @pytest.fixture
-def server_process(tmp_path: Path) -> Iterator[ServerProcess]:
-    """A server in a process of its own."""
+def plain_server_process(tmp_path: Path) -> Iterator[ServerProcess]:
+    """A server in a process of its own, with the database that it makes itself."""
     process = ServerProcess(tmp_path)
+    yield process
+    process.kill()
+
+
+@pytest.fixture
+def server_process(tmp_path: Path, database_url: str) -> Iterator[ServerProcess]:
+    """A server in a process of its own, on a database of each kind."""
+    process = ServerProcess(tmp_path, database_url)
     yield process
     process.kill()
 

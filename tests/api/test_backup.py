@@ -36,9 +36,9 @@ def reconstruct(http: Any, session: str) -> dict[str, str]:
 
 
 def test_a_backup_under_load_can_be_served_and_has_all_that_was_acknowledged_before(
-    server_process: Any, line: Any, shared_data: Path, tmp_path: Path
+    plain_server_process: Any, line: Any, shared_data: Path, tmp_path: Path
 ) -> None:
-    server, copy = server_process.start(), tmp_path / "copy"
+    server, copy = plain_server_process.start(), tmp_path / "copy"
     session = server.new_session(name="kept")
     server.http.post(f"/sessions/{session}/recordings", content=(shared_data / "lilium.rawnet").read_bytes())
     network = reconstruct(server.http, session)["network.json"].removeprefix("/api/v1")
@@ -53,13 +53,13 @@ def test_a_backup_under_load_can_be_served_and_has_all_that_was_acknowledged_bef
         acknowledged = 0
         while acknowledged < 100:
             acknowledged = json.loads(socket.recv(timeout=20))["seq"]
-        made = [run("backup", copy, "--data-dir", server_process.data_dir) for _ in range(2)]
+        made = [run("backup", copy, "--data-dir", plain_server_process.data_dir) for _ in range(2)]
         stop.set()
         sender.join()
     assert [done.returncode for done in made] == [0, 0], made[0].stderr
-    server_process.kill()
-    server_process.data_dir = copy
-    served = server_process.start()
+    plain_server_process.kill()
+    plain_server_process.data_dir = copy
+    served = plain_server_process.start()
     assert served.http.get(f"/sessions/{session}").json()["name"] == "kept"
     messages = served.http.get(f"/sessions/{session}/recordings/r").text.splitlines()[1:]
     assert [json.loads(text)["seq"] for text in messages] == list(range(len(messages)))

@@ -1,12 +1,11 @@
 """kill -9 at the worst moments: what was acknowledged is there afterwards, and the work goes on."""
 
 import json
-import os
 import resource
 import signal
-import subprocess
 import threading
 import time
+from contextlib import nullcontext
 from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+from tests.jobs.support import origins, until, wait_for_end, workers
 from tracemesh.storage import models
 
 
@@ -21,18 +21,11 @@ def test_nothing_acknowledged_is_lost_and_the_device_goes_on(server_process: Any
     server = server_process.start()
     session = server.new_session()
     messages = [json.dumps(m) for m in line(4000, block=2)]
-    hello = json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "test"}})
+    hello = _hello(session)
     acknowledged = _send_until_killed(server_process, server, hello, messages)
     assert 0 <= acknowledged < len(messages) - 1, "the server was killed too late to test anything"
     server = server_process.start()
-    with server.connect("/ingest") as socket:
-        socket.send(hello)
-        welcome = json.loads(socket.recv(timeout=20))
-        assert welcome["next_seq"] > acknowledged
-        for text in messages[welcome["next_seq"] :]:
-            socket.send(text)
-        while json.loads(socket.recv(timeout=20))["seq"] < len(messages) - 1:
-            pass
+    _send_the_rest(server, hello, messages, acknowledged)
     assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
     assert server.http.get(f"/sessions/{session}").json()["samples"] == 4000
 
@@ -65,32 +58,20 @@ def _send_all(socket: Any, messages: list[str]) -> None:
         pass
 
 
-def test_a_job_is_taken_up_after_the_server_was_killed(server_process: Any, shared_data: Path) -> None:
+def test_a_job_of_a_killed_server_ends_with_it_and_is_taken_up(server_process: Any, shared_data: Path) -> None:
     server = server_process.start()
     session = server.new_session()
     scan = (shared_data / "scans" / "cone-noisy.rawnet").read_bytes()
     server.http.post(f"/sessions/{session}/recordings", content=scan)
     job = server.http.post(f"/sessions/{session}/reconstructions").json()["id"]
+    until(lambda: server.http.get(f"/reconstructions/{job}").json()["fraction"] > 0)
+    processes = origins(server.pid) + workers(server.pid)
+    assert len(processes) > 1
     server_process.kill()
+    wait_for_end(processes)
     server = server_process.start()
     done = _wait(server, job)
     assert (done["state"], sorted(done["artifacts"])) == ("done", ["mesh.glb", "network.json", "report.json"])
-
-
-def test_workers_end_with_a_killed_server(server_process: Any, shared_data: Path) -> None:
-    server = server_process.start()
-    session = server.new_session()
-    server.http.post(
-        f"/sessions/{session}/recordings", content=(shared_data / "scans" / "cone-noisy.rawnet").read_bytes()
-    )
-    _wait(server, server.http.post(f"/sessions/{session}/reconstructions").json()["id"])
-    workers = _children(server_process.process.pid)
-    assert workers
-    server_process.kill()
-    deadline = time.monotonic() + 20
-    while any(_alive(pid) for pid in workers) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not [pid for pid in workers if _alive(pid)]
 
 
 def test_a_graceful_stop_commits_what_was_accepted(server_process: Any, line: Any) -> None:
@@ -98,9 +79,7 @@ def test_a_graceful_stop_commits_what_was_accepted(server_process: Any, line: An
     session = server.new_session()
     messages = [json.dumps(m) for m in line(500)]
     with server.connect("/ingest") as socket:
-        socket.send(
-            json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "t"}})
-        )
+        socket.send(_hello(session))
         socket.recv(timeout=20)
         for text in messages:
             socket.send(text)
@@ -114,30 +93,42 @@ def test_a_graceful_stop_commits_what_was_accepted(server_process: Any, line: An
     assert server.http.get(f"/sessions/{session}/recordings/r").text.count("\n") - 2 >= acknowledged
 
 
-def test_a_full_disk_is_told_and_nothing_acknowledged_is_lost(server_process: Any, line: Any) -> None:
-    """No file may grow beyond 400 kB: SQLite meets the same error as on a full disk."""
-    server = server_process.start(preexec_fn=_small_files)
-    session = server.new_session()
-    messages = [json.dumps(m) for m in line(20_000, block=100)]
-    hello = json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "test"}})
-    acknowledged, refusal = -1, {}
+def test_a_full_disk_is_told_and_nothing_acknowledged_is_lost(
+    server_process: Any, line: Any, request: pytest.FixtureRequest
+) -> None:
+    """No file of the database may grow beyond a size: it meets the same error as on a full disk."""
+    on_postgresql = server_process.database_url.startswith("postgresql")
+    messages = [json.dumps(m) for m in line(24_000 if on_postgresql else 6_000)]  # several times what has room
+    with request.getfixturevalue("postgresql").no_file_beyond(1_200_000) if on_postgresql else nullcontext():
+        server = server_process.start(preexec_fn=None if on_postgresql else _small_files)
+        session = server.new_session()
+        hello = _hello(session)
+        acknowledged, refusal = _send_until_refused(server, hello, messages)
+        assert refusal["code"] == "storage"
+        assert 0 < acknowledged < len(messages) - 1
+        assert server.http.get(f"/sessions/{session}").status_code == 200, "reading still works"
+    server_process.kill()
+    server = server_process.start()
+    _send_the_rest(server, hello, messages, acknowledged)
+    assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
+
+
+def _send_until_refused(server: Any, hello: str, messages: list[str]) -> tuple[int, dict[str, Any]]:
+    """The last acknowledged number, and what the server says when it can take no more."""
+    acknowledged = -1
     with server.connect("/ingest") as socket:
         socket.send(hello)
         socket.recv(timeout=20)
         sender = threading.Thread(target=_send_all, args=(socket, messages))
         sender.start()
-        while not refusal:
-            answer = json.loads(socket.recv(timeout=20))
-            if answer["type"] == "ack":
-                acknowledged = answer["seq"]
-            else:
-                refusal = answer
+        while (answer := json.loads(socket.recv(timeout=20)))["type"] == "ack":
+            acknowledged = answer["seq"]
         sender.join()
-    assert refusal["code"] == "storage"
-    assert 0 < acknowledged < len(messages) - 1
-    assert server.http.get(f"/sessions/{session}").status_code == 200, "reading still works"
-    server_process.kill()
-    server = server_process.start()
+    return acknowledged, answer
+
+
+def _send_the_rest(server: Any, hello: str, messages: list[str], acknowledged: int) -> None:
+    """As a device does that was cut off: from where the server wants it."""
     with server.connect("/ingest") as socket:
         socket.send(hello)
         next_seq = json.loads(socket.recv(timeout=20))["next_seq"]
@@ -146,7 +137,10 @@ def test_a_full_disk_is_told_and_nothing_acknowledged_is_lost(server_process: An
             socket.send(text)
         while json.loads(socket.recv(timeout=20))["seq"] < len(messages) - 1:
             pass
-    assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
+
+
+def _hello(session: str) -> str:
+    return json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "test"}})
 
 
 def test_postgresql_crashes_under_a_device(start_server: Any, new_database: Any, postgresql: Any, line: Any) -> None:
@@ -154,7 +148,7 @@ def test_postgresql_crashes_under_a_device(start_server: Any, new_database: Any,
     server = start_server(database_url=new_database("postgresql"))
     session = server.new_session()
     messages = [json.dumps(m) for m in line(3000, block=10)]
-    hello = json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "test"}})
+    hello = _hello(session)
     acknowledged, crashes = -1, 0
     while acknowledged < len(messages) - 1:
         with server.connect("/ingest") as socket:
@@ -218,16 +212,3 @@ def _wait(server: Any, job: str) -> Any:
     while (state := server.http.get(f"/reconstructions/{job}").json())["state"] in ("queued", "running"):
         time.sleep(0.05)
     return state
-
-
-def _children(pid: int) -> list[int]:
-    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=True)
-    return [int(word) for word in found.stdout.split()]
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return "Z" not in Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]

@@ -27,11 +27,11 @@ def complaints(**options: Any) -> list[str]:
 
 
 def test_a_sound_server_gets_a_clean_bill_and_a_missing_folder_stays_missing(
-    server_process: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    plain_server_process: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    server_process.start()
+    plain_server_process.start()
     with pytest.raises(SystemExit, match="0"):
-        main(["doctor", "--data-dir", str(server_process.data_dir), "--port", str(server_process.port)])
+        main(["doctor", "--data-dir", str(plain_server_process.data_dir), "--port", str(plain_server_process.port)])
     told = capsys.readouterr().out
     assert "!!" not in told
     assert "a server answers" in told

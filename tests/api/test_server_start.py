@@ -61,18 +61,18 @@ def test_an_address_that_is_taken_is_named_before_anything_starts(tmp_path: Path
 
 
 def test_the_first_start_off_loopback_prints_the_owners_link_and_never_again(
-    server_process: Any, tmp_path: Path
+    plain_server_process: Any, tmp_path: Path
 ) -> None:
     def started(output: Path) -> tuple[Any, str]:
         with output.open("w") as file:
-            server = server_process.start(host="0.0.0.0", stdout=file)
+            server = plain_server_process.start(host="0.0.0.0", stdout=file)
         while "Open" not in output.read_text():
-            assert server_process.process.poll() is None
+            assert plain_server_process.process.poll() is None
             time.sleep(0.05)
         return server, output.read_text()
 
     _, first = started(tmp_path / "first")
-    server_process.kill()
+    plain_server_process.kill()
     server, second = started(tmp_path / "second")
     (secret,) = re.findall(r"http://\S+/\?token=(\S+)", first)
     assert "token=" not in second

@@ -16,7 +16,6 @@ from tracemesh.storage.database import Database
 
 pytestmark = [
     pytest.mark.usefixtures("torn_connections"),
-    pytest.mark.parametrize("database_url", ["sqlite"], indirect=True),
     pytest.mark.parametrize("executor", ["dask"], indirect=True),
 ]
 Start = Callable[..., JobRunner]
