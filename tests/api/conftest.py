@@ -92,13 +92,22 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+def database_kind(request: pytest.FixtureRequest) -> str:
+    """All tests of the API run on each."""
+    return str(request.param)
+
+
 @pytest.fixture(scope="module")
-def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., RunningServer]]:
+def start_server(
+    database_kind: str, new_database: Callable[[str], str], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[..., RunningServer]]:
     """Start a server in a thread, with settings of one's own; all are stopped after the module."""
     running: list[tuple[uvicorn.Server, threading.Thread, RunningServer]] = []
 
     def start(**options: Any) -> RunningServer:
-        settings = Settings(**{"data_dir": tmp_path_factory.mktemp("data"), "port": free_port(), **options})
+        own = {"data_dir": tmp_path_factory.mktemp("data"), "port": free_port()}
+        settings = Settings(**{"database_url": new_database(database_kind), **own, **options})
         server = uvicorn.Server(configure(settings))
         thread = threading.Thread(target=server.run)
         thread.start()
@@ -116,12 +125,10 @@ def start_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[
         thread.join()
 
 
-@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
-def server(
-    request: pytest.FixtureRequest, start_server: Callable[..., RunningServer], new_database: Callable[[str], str]
-) -> RunningServer:
-    """A server with default settings on a database of each kind, shared by the tests of a module."""
-    return start_server(database_url=new_database(request.param))
+@pytest.fixture(scope="module")
+def server(start_server: Callable[..., RunningServer]) -> RunningServer:
+    """A server with default settings, shared by the tests of a module."""
+    return start_server()
 
 
 @dataclass

@@ -132,9 +132,9 @@ for statements in map(int, sys.argv[4:]):
 
 
 def test_a_restore_that_is_killed_leaves_nothing_and_asking_again_makes_it_whole(
-    server: Any, session: str, new_database: Any, request: pytest.FixtureRequest, tmp_path: Path
+    server: Any, session: str, new_database: Any, database_kind: str, tmp_path: Path
 ) -> None:
-    archive, url = tmp_path / "archive.zip", new_database(request.node.callspec.params["server"])
+    archive, url = tmp_path / "archive.zip", new_database(database_kind)
     archive.write_bytes(server.http.get(f"/sessions/{session}/archive").content)
     database = Database(url)
     database.migrate()

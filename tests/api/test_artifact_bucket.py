@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 
 def finished(server: Any, job: str) -> dict[str, Any]:
     while (state := server.http.get(f"/reconstructions/{job}").json())["state"] in ("queued", "running"):
@@ -12,6 +14,7 @@ def finished(server: Any, job: str) -> dict[str, Any]:
     return dict(state)
 
 
+@pytest.mark.parametrize("database_kind", ["postgresql"], indirect=True)
 def test_any_server_serves_what_one_of_them_made_and_a_bucket_that_is_away_is_named(
     start_server: Callable[..., Any], new_database: Callable[[str], str], s3: Any, shared_data: Path
 ) -> None:

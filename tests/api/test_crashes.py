@@ -93,6 +93,7 @@ def test_a_graceful_stop_commits_what_was_accepted(server_process: Any, line: An
     assert server.http.get(f"/sessions/{session}/recordings/r").text.count("\n") - 2 >= acknowledged
 
 
+@pytest.mark.usefixtures("torn_connections")
 def test_a_full_disk_is_told_and_nothing_acknowledged_is_lost(
     server_process: Any, line: Any, request: pytest.FixtureRequest
 ) -> None:
@@ -143,9 +144,11 @@ def _hello(session: str) -> str:
     return json.dumps({"type": "hello", "recording": "r", "session": session, "device": {"id": "d", "kind": "test"}})
 
 
-def test_postgresql_crashes_under_a_device(start_server: Any, new_database: Any, postgresql: Any, line: Any) -> None:
+@pytest.mark.usefixtures("torn_connections")
+@pytest.mark.parametrize("database_kind", ["postgresql"], indirect=True)
+def test_postgresql_crashes_under_a_device(start_server: Any, postgresql: Any, line: Any) -> None:
     """The device is told or cut off, connects again as a bridge does, and everything is there once and in order."""
-    server = start_server(database_url=new_database("postgresql"))
+    server = start_server()
     session = server.new_session()
     messages = [json.dumps(m) for m in line(3000, block=10)]
     hello = _hello(session)

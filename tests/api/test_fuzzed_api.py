@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 
-def test_schemathesis_finds_no_server_error(
-    start_server: Callable[..., Any], new_database: Callable[[str], str], tmp_path: Path
-) -> None:
+
+@pytest.mark.parametrize("database_kind", ["postgresql"], indirect=True)
+def test_schemathesis_finds_no_server_error(start_server: Callable[..., Any], tmp_path: Path) -> None:
     """On PostgreSQL, the stricter one, and with the owner's token: whoever may less is refused sooner."""
-    url = new_database("postgresql")
-    server = start_server(token="correct horse battery staple", database_url=url, max_requests=10**6)
+    server = start_server(token="correct horse battery staple", max_requests=10**6)
     command = [Path(sys.executable).with_name("schemathesis"), "run", f"http://127.0.0.1:{server.port}/openapi.json"]
     command += ["--header", f"Authorization: Bearer {server.token}"]
     options = ["--phases", "coverage", "--checks", "not_a_server_error", "--seed", "1", "--no-color"]

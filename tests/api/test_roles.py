@@ -118,11 +118,9 @@ class World:
             return int(re.findall(r"HTTP (\d+)", str(error))[0])
 
 
-@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
-def world(
-    request: pytest.FixtureRequest, start_server: Callable[..., Any], new_database: Callable[[str], str]
-) -> Iterator[World]:
-    url = new_database(request.param)
+@pytest.fixture(scope="module")
+def world(database_kind: str, start_server: Callable[..., Any], new_database: Callable[[str], str]) -> Iterator[World]:
+    url = new_database(database_kind)
     server = start_server(host="0.0.0.0", token=TOKEN, database_url=url, max_requests=10_000)
     database = Database(url)
     world = World(server, database)

@@ -79,9 +79,10 @@ def test_a_full_disk_is_seen_coming(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_a_stranger_at_the_port_is_named(tmp_path: Path) -> None:
     with http.server.HTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler) as stranger:
-        thread = threading.Thread(target=stranger.handle_request)
+        thread = threading.Thread(target=stranger.serve_forever)
         thread.start()
         (told,) = complaints(data_dir=tmp_path, port=stranger.server_address[1])
+        stranger.shutdown()
         thread.join()
     assert told.startswith("something else than tracemesh listens")
 

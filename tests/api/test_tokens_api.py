@@ -14,9 +14,9 @@ from tracemesh.storage.models import TokenRow
 TOKEN = "correct horse battery staple"
 
 
-@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
-def database(request: pytest.FixtureRequest, new_database: Callable[[str], str]) -> Any:
-    database = Database(new_database(request.param))
+@pytest.fixture(scope="module")
+def database(database_kind: str, new_database: Callable[[str], str]) -> Any:
+    database = Database(new_database(database_kind))
     yield database
     database.close()
 
