@@ -103,12 +103,20 @@ def postgresql() -> Iterator[PostgreSql]:
     shutil.rmtree(folder)
 
 
+@contextmanager
+def sockets_may_be_left() -> Iterator[None]:
+    """pg8000 and dask leave those of torn connections to the garbage collector, which warns."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "unclosed <socket", ResourceWarning)
+        yield
+        gc.collect()
+
+
 @pytest.fixture
 def torn_connections() -> Iterator[None]:
-    """For who tears connections: pg8000 and dask leave their sockets to the garbage collector, which warns."""
-    warnings.filterwarnings("ignore", "unclosed <socket", ResourceWarning)
-    yield
-    gc.collect()
+    """For who tears connections."""
+    with sockets_may_be_left():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ import pytest
 import uvicorn
 from websockets.sync.client import ClientConnection, connect
 
+from tests.conftest import sockets_may_be_left
 from tracemesh.api.server import configure
 from tracemesh.settings import Settings
 
@@ -119,10 +120,12 @@ def start_server(
         return running[-1][2]
 
     yield start
-    for server, thread, client in running:
-        client.http.close()
-        server.should_exit = True
-        thread.join()
+    with sockets_may_be_left():
+        for server, thread, client in running:
+            client.http.close()
+            server.should_exit = True
+            thread.join()
+        running.clear()
 
 
 @pytest.fixture(scope="module")
