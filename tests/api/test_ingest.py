@@ -175,6 +175,9 @@ def test_a_deleted_session_cuts_its_devices_off(server: Any, ride: Ride, line: L
     while (answer := rider.receive())["type"] == "ack":
         pass
     assert answer["code"] == "unknown"
+    with pytest.raises(ConnectionClosed) as closed:
+        rider.receive()
+    assert closed.value.__cause__ is None, "the server read on until its close was answered"
     assert server.http.get(f"/sessions/{session}").status_code == 404
 
 

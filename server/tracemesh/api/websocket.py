@@ -60,7 +60,7 @@ class SteadyReading(WebSocketsSansIOProtocol):
         paused, self.read_paused = self.read_paused, True  # or uvicorn would pause now
         super().send_receive_event_to_app()
         self.read_paused = paused
-        if not paused and self.queue.qsize() >= MAX_WAITING:
+        if not paused and not self.close_sent and self.queue.qsize() >= MAX_WAITING:
             self.read_paused = True
             self.transport.pause_reading()
 
