@@ -1,12 +1,13 @@
 """Laws of ingest: what is stored does not depend on how it was grouped, nor on restarts in between."""
 
+from collections.abc import Iterator
 from dataclasses import asdict
 from threading import Thread
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sqlalchemy import select
+from sqlalchemy import event, select
 from sqlalchemy.orm import Session
 
 from tracemesh.errors import Overtaken, Refused
@@ -135,6 +136,38 @@ def test_a_group_is_stored_whole_or_not_at_all(database: Database) -> None:
     with database.read() as transaction:
         assert transaction.scalars(select(MessageRow)).all() == []
         assert transaction.scalar(select(RecordingRow.next_seq)) == 0
+
+
+def test_a_hundred_recordings_take_no_statement_for_each(database: Database) -> None:
+    """Neither a round trip nor the interpreter's lock is asked for row by row."""
+    hellos = [HELLO.model_copy(update={"recording": f"r{number}"}) for number in range(109)]
+    with database.write() as transaction:
+        states = [open_recording(transaction, hello, hello.model_dump_json().encode()) for hello in hellos]
+    row_by_row: list[bool] = []
+    event.listen(database.engine, "before_cursor_execute", lambda *about: row_by_row.append(about[-1]))
+    for group in _start_and_sample(states):
+        row_by_row.clear()
+        with database.write() as transaction:
+            commit(transaction, group)
+    assert not any(row_by_row) and len(row_by_row) < len(states) / 2
+    with database.read() as transaction:
+        assert all(len(list(recording_messages(transaction, state.key))) == 2 for state in states)
+        reached = dict(transaction.execute(select(RecordingRow.key, RecordingRow.bytes)).all())
+        lengths = [list_curves(transaction, state.session.id)[0].length for state in states]
+    assert reached == {state.key: state.bytes for state in states}
+    assert lengths == [state.curves[0].length for state in states] == [number / 7 for number in range(109)]
+
+
+def _start_and_sample(states: list[RecordingState]) -> Iterator[Group]:
+    """A group that starts a curve of each, and one that goes as far along each as nobody else."""
+    started, sampled = Group(), Group()
+    for number, state in enumerate(states):
+        distance = [0.0, number / 7]
+        samples = Samples(seq=1, curve=0, first_sample=0, distance=distance, quaternion=[(1.0, 0.0, 0.0, 0.0)] * 2)
+        for group, message in ((started, CurveStart(seq=0, curve=0)), (sampled, samples)):
+            state.advance(message, 1 + number)
+            group.add(state, message, b"x")
+    yield from (started, sampled)
 
 
 def test_pages_of_messages_are_all_messages(database: Database) -> None:

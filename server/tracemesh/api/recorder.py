@@ -22,7 +22,7 @@ from tracemesh.storage.sessions import delete_session
 from tracemesh.storage.states import RecordingState, SessionState
 from tracemesh.wire.device import Hello, Recorded
 
-GATHER = 0.01
+GATHER = 0.025
 """s between the beginnings of two commits, at least: each costs about the same, however many messages it holds."""
 log = logging.getLogger(__name__)
 T = TypeVar("T")
