@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from tracemesh.geometry.network import Floats, Ints
 from tracemesh.geometry.nodes.contacts import DRIFT, HEADING, NORMAL, POSITION
@@ -19,7 +19,8 @@ _FREEDOM = 5
 """Nine equations, of which the two unit normals make seven, less two unknowns."""
 _NEAR = 0.06
 """m; pairs of places whose ends are nearer than this are one candidate, not two."""
-_PLAUSIBLE = float(chi2.ppf(0.9999, _FREEDOM))
+_PLAUSIBLE = float(chdtri(_FREEDOM, 1e-4))
+"""Sum of squares that chance exceeds once in 10,000 times."""
 
 
 @dataclass(frozen=True)
