@@ -49,6 +49,18 @@ def test_a_length_stretches_its_segment_until_it_is_taken_back(server: Any, sess
     assert drawn(server, session, index) == pytest.approx(before, rel=1e-4)
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_curve_without_marks_is_measured_as_a_whole(server: Any, session: str, closed: bool) -> None:
+    path = f"/sessions/{session}/curves"
+    for other in server.http.get(path).json()[1:]:
+        server.http.patch(f"{path}/{other['index']}", json={"removed": True}).raise_for_status()
+    alone = server.http.patch(f"{path}/0", json={"marks": [], "closed": closed}).json()
+    give(server, session, 0, (0, alone["samples"] - 1, 3.0)).raise_for_status()
+    preview = Preview.model_validate(server.http.post(f"/sessions/{session}/preview").json())
+    steps = np.diff(np.reshape(preview.curves[0].positions, (-1, 3)), axis=0)
+    assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(3.0, rel=0.1)
+
+
 def test_it_goes_with_a_mark_that_moves_and_sleeps_while_another_is_between(server: Any, session: str) -> None:
     marks = curve(server, session, 1)["marks"]
     first, second = marks[0]["sample"], marks[1]["sample"]

@@ -262,7 +262,7 @@ export interface Curve {
    */
   length: number;
   /**
-   * of segments; used while both ends are marked
+   * of segments; used while both ends are marked, or are those of a curve without marks
    */
   lengths: MeasuredLength[];
   marks: Mark[];

@@ -48,12 +48,20 @@ def load_sent(transaction: Transaction, session: str) -> tuple[Scan, list[int]]:
 
 
 def with_measured(curve: CurveScan, measured: Mapping[tuple[int, int], float]) -> CurveScan:
-    """A curve as sent with those lengths (m, by first and last sample) that are between two neighbouring marks."""
-    samples = curve.node_samples.tolist()
-    returns = len(samples) > 1 and curve.node_ids[0] == curve.node_ids[-1]
-    ends = samples + samples[:1] if curve.closed and not returns else samples
-    lengths = np.array([measured.get(pair, np.nan) for pair in pairwise(ends)])
+    """A curve as sent with those lengths (m, by first and last sample) that are between two neighbouring marks.
+
+    A curve without marks is measured from its first sample to its last.
+    """
+    lengths = np.array([measured.get(pair, np.nan) for pair in pairwise(_segment_ends(curve))])
     return curve if np.isnan(lengths).all() else replace(curve, lengths=lengths)
+
+
+def _segment_ends(curve: CurveScan) -> list[int]:
+    samples: list[int] = curve.node_samples.tolist()
+    if not samples:
+        return [0, len(curve.distance) - 1]
+    returns = len(samples) > 1 and curve.node_ids[0] == curve.node_ids[-1]
+    return samples + samples[:1] if curve.closed and not returns else samples
 
 
 def _measured(row: CurveRow) -> dict[tuple[int, int], float]:

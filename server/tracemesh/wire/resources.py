@@ -108,7 +108,9 @@ class Curve(Message):
     samples: Count
     length: float = Field(ge=0, description="m, as the odometer saw it")
     marks: list[Mark]
-    lengths: list[MeasuredLength] = Field(default=[], description="of segments; used while both ends are marked")
+    lengths: list[MeasuredLength] = Field(
+        default=[], description="of segments; used while both ends are marked, or are those of a curve without marks"
+    )
 
 
 class CurveUpdate(Message):

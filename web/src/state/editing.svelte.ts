@@ -11,7 +11,7 @@ import {
   placesOf,
   roomFor,
   sameMarks,
-  type SegmentEnds,
+  type Segment,
   unmarked,
 } from "./marks";
 import type { Network } from "./network";
@@ -219,10 +219,10 @@ export class EditStore {
   }
 
   /** Say how long a segment is, m, as somebody measured it; undefined: nobody did. */
-  async measure(curve: number, segment: SegmentEnds, length: number | undefined): Promise<void> {
+  async measure(curve: number, segment: Segment, length: number | undefined): Promise<void> {
     const old = this.store.detailsOf(curve)?.lengths ?? [];
     const set = (lengths: MeasuredLength[]): Promise<void> => this.store.write([{ index: curve, change: { lengths } }]);
-    const name = `segment ${segment.first.node}–${segment.last.node}`;
+    const name = `length of ${segment.name}`;
     const label = length === undefined ? `${name} not measured any more` : `${name} measured: ${formatLength(length)}`;
     const fresh = lengthsWith(old, segment, length);
     await this.store.command(() => this.store.history.do({ label, run: () => set(fresh), revert: () => set(old) }));

@@ -77,16 +77,19 @@ it("finds every mark of a node, also two on one curve", () => {
 it("cuts curves at their marks, closed ones all the way round, and knows what was measured", () => {
   const three = [...marks, { sample: 120, node: 3 }];
   const names = (curve: Parameters<typeof segmentsOf>[0]): string[] =>
-    segmentsOf(curve).map(({ first, last, measured }) => `${first.node}-${last.node} ${measured ?? ""}`.trim());
+    segmentsOf(curve).map((segment) => `${segment.name} ${segment.measured ?? ""}`.trim());
   const lengths = [{ first: 120, last: 0, length: 0.4 }];
-  expect(names({ marks: three, closed: false, lengths })).toEqual(["1-2", "2-3"]);
-  expect(names({ marks: three, closed: true, lengths })).toEqual(["1-2", "2-3", "3-1 0.4"]);
-  expect(names({ marks: [...three, { sample: 150, node: 1 }], closed: true, lengths })).toEqual(["1-2", "2-3", "3-1"]);
-  expect(names({ marks: [], closed: true, lengths })).toEqual([]);
+  expect(names({ marks: three, closed: false, lengths, samples: 200 })).toEqual(["1–2", "2–3"]);
+  expect(names({ marks: three, closed: true, lengths, samples: 200 })).toEqual(["1–2", "2–3", "3–1 0.4"]);
+  expect(names({ marks: [...three, { sample: 150, node: 1 }], closed: true, lengths, samples: 200 })).toEqual(["1–2", "2–3", "3–1"]);
+  expect(names({ marks: [], closed: true, lengths: [{ first: 0, last: 199, length: 2 }], samples: 200 })).toEqual([
+    "whole curve 2",
+  ]);
+  expect(names({ marks: [], closed: false, lengths, samples: 1 })).toEqual([]);
 });
 
 it("sets and takes away one measured length", () => {
-  const [segment] = segmentsOf({ marks, closed: false, lengths: [] });
+  const [segment] = segmentsOf({ marks, closed: false, lengths: [], samples: 200 });
   if (!segment) throw new Error("there is a segment");
   const other = { first: 5, last: 9, length: 1 };
   const set = lengthsWith([other], segment, 0.3);

@@ -51,32 +51,43 @@ export function marksChanged(marks: readonly Mark[], { sample, node }: Mark, to:
   return changed.sort((a, b) => a.sample - b.sample);
 }
 
-/** A stretch of a curve between two neighbouring marks. */
-export interface SegmentEnds {
-  readonly first: Mark;
-  readonly last: Mark;
+/** A stretch of a curve between two neighbouring marks; a curve without marks is one. */
+export interface Segment {
+  /** What people call it: the nodes at its ends. */
+  readonly name: string;
+  /** Samples at its ends. */
+  readonly first: number;
+  readonly last: number;
   /** m, if somebody measured it. */
   readonly measured: number | undefined;
 }
 
 /** The segments of a curve in its order; a closed one returns to its first mark. */
-export function segmentsOf({ marks, closed, lengths }: Pick<Curve, "marks" | "closed" | "lengths">): SegmentEnds[] {
+export function segmentsOf(curve: Pick<Curve, "marks" | "closed" | "lengths" | "samples">): Segment[] {
+  const ends = segmentEnds(curve);
+  if (!ends.length) return curve.samples > 1 ? [segment(curve, "whole curve", 0, curve.samples - 1)] : [];
+  return ends.slice(1).map((last, i) => {
+    const first = ends[i] as Mark;
+    return segment(curve, `${first.node}–${last.node}`, first.sample, last.sample);
+  });
+}
+
+function segmentEnds({ marks, closed }: Pick<Curve, "marks" | "closed">): readonly Mark[] {
   const [first, final] = [marks[0], marks.at(-1)];
   const returns = marks.length > 1 && first?.node === final?.node;
-  const ends = closed && first && !returns ? [...marks, first] : marks;
-  return ends.slice(1).map((last, i) => {
-    const from = ends[i] as Mark;
-    const known = lengths.find((length) => length.first === from.sample && length.last === last.sample);
-    return { first: from, last, measured: known?.length };
-  });
+  return closed && first && !returns ? [...marks, first] : marks;
+}
+
+function segment({ lengths }: Pick<Curve, "lengths">, name: string, first: number, last: number): Segment {
+  return { name, first, last, measured: lengths.find((known) => known.first === first && known.last === last)?.length };
 }
 
 /** Measured lengths with that of one segment set (m), or taken away. */
 export function lengthsWith(
   lengths: readonly MeasuredLength[],
-  { first, last }: SegmentEnds,
+  { first, last }: Segment,
   length: number | undefined,
 ): MeasuredLength[] {
-  const others = lengths.filter((known) => known.first !== first.sample || known.last !== last.sample);
-  return length === undefined ? others : [...others, { first: first.sample, last: last.sample, length }];
+  const others = lengths.filter((known) => known.first !== first || known.last !== last);
+  return length === undefined ? others : [...others, { first, last, length }];
 }
