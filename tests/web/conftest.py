@@ -24,6 +24,8 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
 )
 
+SENSORS = ["accelerometer", "gyroscope", "magnetometer"]
+
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
@@ -55,6 +57,19 @@ def page(browser: Browser) -> Iterator[Page]:
     yield page
     context.close()
     assert not failures
+
+
+@pytest.fixture
+def phone(browser: Browser) -> Iterator[Page]:
+    """An empty page of a phone that may read its sensors."""
+    context = browser.new_context(
+        viewport={"width": 390, "height": 780}, has_touch=True, is_mobile=True, permissions=SENSORS
+    )
+    page = context.new_page()
+    page.set_default_timeout(1000 * PATIENCE)
+    expect.set_options(timeout=1000 * PATIENCE)
+    yield page
+    context.close()
 
 
 @pytest.fixture

@@ -3,64 +3,18 @@
 import json
 import re
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, CDPSession, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from tests.web.conftest import CHROMIUM, FLAGS
+from tests.web.conftest import CHROMIUM, FLAGS, SENSORS
+from tests.web.phone import Hand, reconstructed, roundness
 from tests.web.support import PATIENCE, Server, free_port, running_server
-from tracemesh.geometry.rotations import matrix_to_quaternion
 from tracemesh_bridge.framing import Frame, FrameLayout, encode
 
-SENSORS = ["accelerometer", "gyroscope", "magnetometer"]
 TICKS_PER_FRAME = 8
-TURN = 12.0
-"""s that the phone takes around the circle: slow, for it has to wait a little while the server is killed."""
-
-
-class Hand:
-    """Leads the phone around a circle of latitude on a sphere: top edge first, screen outwards."""
-
-    def __init__(self, page: Page) -> None:
-        self._devtools: CDPSession = page.context.new_cdp_session(page)
-        metadata = {"available": True, "maximumFrequency": 60, "minimumFrequency": 1}
-        self._devtools.send(
-            "Emulation.setSensorOverrideEnabled",
-            {"enabled": True, "type": "absolute-orientation", "metadata": metadata},
-        )
-
-    def hold(self, angle: float) -> None:
-        """Bring the phone to a place of the circle, rad from East."""
-        tangent = np.array([-np.sin(angle), np.cos(angle), 0.0])
-        normal = np.array([0.8 * np.cos(angle), 0.8 * np.sin(angle), 0.6])
-        axes = np.column_stack([np.cross(tangent, normal), tangent, normal])
-        w, x, y, z = map(float, matrix_to_quaternion(axes[None])[0])
-        reading = {"quaternion": {"x": x, "y": y, "z": z, "w": w}}
-        self._devtools.send("Emulation.setSensorOverrideReadings", {"type": "absolute-orientation", "reading": reading})
-
-    def lead(self, start: float, end: float) -> None:
-        """Lead it steadily over a part of the circle: a phone has no odometer, so it must not stand still."""
-        begin = time.monotonic()
-        duration = TURN * (end - start) / (2 * np.pi)
-        while (passed := time.monotonic() - begin) < duration:
-            self.hold(start + (end - start) * passed / duration)
-            time.sleep(0.008)
-        self.hold(end)
-
-
-@pytest.fixture
-def phone(browser: Browser) -> Iterator[Page]:
-    context = browser.new_context(
-        viewport={"width": 390, "height": 780}, has_touch=True, is_mobile=True, permissions=SENSORS
-    )
-    page = context.new_page()
-    page.set_default_timeout(1000 * PATIENCE)
-    expect.set_options(timeout=1000 * PATIENCE)
-    yield page
-    context.close()
 
 
 def test_a_circle_scanned_by_phone_survives_the_death_of_the_server(phone: Page, tmp_path: Path) -> None:
@@ -91,8 +45,8 @@ def test_a_circle_scanned_by_phone_survives_the_death_of_the_server(phone: Page,
         (curve,) = server.call("GET", f"/sessions/{session}/curves")
         assert (curve["boundary"], curve["closed"], curve["ended"]) == (True, True, True)
         assert [mark["node"] for mark in curve["marks"]] == [0]
-        points = _reconstructed(server, session)
-    assert _roundness(points) < 0.05
+        points = reconstructed(server, session)
+    assert roundness(points) < 0.05
 
 
 def test_a_shape_is_drawn_in_the_air(server: Server, phone: Page) -> None:
@@ -116,7 +70,7 @@ def test_a_shape_is_drawn_in_the_air(server: Server, phone: Page) -> None:
         time.sleep(0.1)
     assert [[mark["node"] for mark in curve["marks"]] for curve in curves] == [[0, 1], [1, 0]]
     assert not any(curve["boundary"] for curve in curves)
-    assert _roundness(_reconstructed(server, session)) < 0.1
+    assert roundness(reconstructed(server, session)) < 0.1
     scan = server.call("GET", f"/sessions/{session}/recordings")
     assert [recording["device"]["wheel"] for recording in scan] == [None], "lengths come from time alone"
 
@@ -207,23 +161,3 @@ def test_a_page_without_https_says_what_is_missing(
         page.get_by_role("button", name="Use this device's sensors").click()
         expect(page.get_by_role("alert")).to_contain_text("HTTPS")
     plain.close()
-
-
-def _reconstructed(server: Server, session: str) -> np.ndarray:
-    """Points (n, 3) of the reconstructed network."""
-    job = server.call("POST", f"/sessions/{session}/reconstructions", {"surface": False, "step": "2%"})
-    give_up = time.monotonic() + PATIENCE
-    while job["state"] in ("queued", "running") and time.monotonic() < give_up:
-        time.sleep(0.1)
-        job = server.call("GET", f"/reconstructions/{job['id']}")
-    assert job["state"] == "done", job["error"]
-    return np.array(server.call("GET", f"/reconstructions/{job['id']}/network.json")["points"])
-
-
-def _roundness(points: np.ndarray) -> float:
-    """Worst distance to the best circle through points (n, 3), relative to its radius."""
-    from_centre = points - points.mean(axis=0)
-    axis = np.linalg.svd(from_centre)[2][2]
-    height = from_centre @ axis
-    radius = np.linalg.norm(from_centre - np.outer(height, axis), axis=1)
-    return float(np.hypot(height, radius - radius.mean()).max() / radius.mean())
