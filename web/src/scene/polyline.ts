@@ -13,6 +13,8 @@ import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js
 
 const FLOATS_PER_SEGMENT = 6;
 const GHOST_OPACITY = 0.22;
+/** How much larger a full buffer becomes. */
+const GROWTH = 1.25;
 
 /** A wide line that grows at its end; what lies behind the surface shows through faintly. */
 export class Polyline {
@@ -63,13 +65,13 @@ export class Polyline {
     for (let from = 3 * start, to = FLOATS_PER_SEGMENT * start; from < 3 * segments; from += 3) {
       for (let k = 0; k < FLOATS_PER_SEGMENT; k += 1, to += 1) array[to] = positions[from + k] as number;
     }
-    buffer.addUpdateRange(FLOATS_PER_SEGMENT * start, FLOATS_PER_SEGMENT * Math.max(segments - start, 0));
+    renew(buffer, FLOATS_PER_SEGMENT * start, FLOATS_PER_SEGMENT * Math.max(segments, start));
     buffer.needsUpdate = true;
   }
 
   #grow(segments: number): void {
     this.#geometry.dispose();
-    this.#capacity = Math.max(segments, 2 * this.#capacity);
+    this.#capacity = Math.max(segments, Math.ceil(GROWTH * this.#capacity));
     this.#geometry = emptyGeometry(this.#capacity);
     this.#compose();
   }
@@ -94,6 +96,15 @@ function emptyGeometry(capacity: number): LineSegmentsGeometry {
   geometry.boundingSphere = new Sphere();
   geometry.instanceCount = 0;
   return geometry;
+}
+
+/** Have floats of a buffer drawn anew, with those that still wait: in a hidden page nothing is drawn, and all wait. */
+function renew(buffer: InstancedInterleavedBuffer, begin: number, end: number): void {
+  const waiting = [...buffer.updateRanges];
+  const first = Math.min(begin, ...waiting.map(({ start }) => start));
+  const last = Math.max(end, ...waiting.map(({ start, count }) => start + count));
+  buffer.clearUpdateRanges();
+  buffer.addUpdateRange(first, last - first);
 }
 
 function segmentBuffer(geometry: LineSegmentsGeometry): InstancedInterleavedBuffer {

@@ -2,6 +2,9 @@ import type { LiveCurve, NodePosition } from "../wire.gen";
 import { type Box, boundingBox } from "../geometry/vectors";
 import type { ToBrowser } from "../protocol/messages";
 
+/** How much larger full memory becomes. */
+const GROWTH = 1.25;
+
 /** Points that grow at the end: [x0, y0, z0, x1, ...] in m, world (ENU, z up). */
 export class Points {
   #data: Float32Array;
@@ -57,7 +60,7 @@ export class Points {
   }
 
   #grow(length: number): void {
-    const larger = new Float32Array(Math.max(length, 2 * this.#data.length));
+    const larger = new Float32Array(Math.max(length, Math.ceil(GROWTH * this.#data.length)));
     larger.set(this.coordinates);
     this.#data = larger;
   }
