@@ -46,3 +46,12 @@ def test_every_state_is_documented():
 def test_every_part_of_a_frame_is_documented():
     page = (DOCS / "devices" / "morphorider.md").read_text()
     assert all(name.split("_")[0] in page for name in MEANINGS)
+
+
+@pytest.mark.parametrize("page", sorted((DOCS / "devices").glob("*.md")), ids=lambda page: page.stem)
+def test_every_device_and_the_table_of_tested_versions_lead_to_each_other(page):
+    """And the table says that nothing of it was verified on hardware, as long as nothing was."""
+    tested = BRIDGE.split("## Tested with\n")[1].split("\n## ")[0]
+    assert f"](devices/{page.name}) |" in tested
+    assert "(../bridge.md#tested-with)" in page.read_text()
+    assert "unverified on real" in tested
