@@ -41,8 +41,8 @@ def watch() -> Iterator[Callable[..., Callable[..., list[dict[str, Any]]]]]:
         yield begin
 
 
-def deliver(servers: list[Any], session: str, recording: str, messages: list[dict[str, Any]], **of_device: Any) -> None:
-    """Send a recording as a bridge does, at another server whenever a connection ends."""
+def deliver(servers: list[Any], session: str, recording: str, messages: list[dict[str, Any]], **of_device: Any) -> int:
+    """Send a recording as a bridge does, at another server whenever a connection ends; how many it took."""
     device = {"id": "d", "kind": "test", **of_device}
     hello = {"type": "hello", "recording": recording, "session": session, "device": device}
     acknowledged, attempt = -1, 0
@@ -57,6 +57,7 @@ def deliver(servers: list[Any], session: str, recording: str, messages: list[dic
                 acknowledged = answer.get("seq", acknowledged)
         attempt += 1
         time.sleep(0.05)
+    return attempt
 
 
 def rides(line: Any, curves: int) -> list[dict[str, Any]]:
@@ -118,7 +119,9 @@ def test_edits_and_progress_at_one_server_are_seen_at_the_other(team: Any, line:
 def test_devices_at_both_servers_draw_into_one_session(
     kind: str, start_processes: Any, new_database: Any, tmp_path: Path, line: Any
 ) -> None:
-    """No two curves or readings get one number, whoever counts; all is stored once and in order, on SQLite too."""
+    """No two curves or readings get one number, whoever counts; all is stored once and in order, on SQLite too.
+
+    A new curve may take its device another connection; readings are too many for that."""
     team = start_processes(2, tmp_path, new_database(kind))
     session = team[0].new_session()
     messages = rides(line, 15)
@@ -126,12 +129,13 @@ def test_devices_at_both_servers_draw_into_one_session(
     ribbon = {"curves": [{"sensors": [0, 1], "spacing": [0.1]}]}
     with ThreadPoolExecutor(4) as devices:
         sent = [devices.submit(deliver, [server], session, f"at-{server.port}", messages) for server in team]
-        sent += [
+        read = [
             devices.submit(deliver, [server], session, f"array-{server.port}", readings, array=ribbon)
             for server in team
         ]
         for one in sent:
             one.result()
+        assert [one.result() for one in read] == [1, 1]
     curves = team[0].http.get(f"/sessions/{session}/curves").json()
     assert sorted(c["index"] for c in curves) == list(range(30))
     assert all(c["samples"] == 20 for c in curves)
