@@ -171,7 +171,11 @@ class Cable:
         with contextlib.suppress(OSError):
             while True:
                 near, _ = self._listening.accept()
-                far = socket.create_connection(("127.0.0.1", self._to))
+                try:
+                    far = socket.create_connection(("127.0.0.1", self._to))
+                except ConnectionRefusedError:  # nobody listens yet
+                    near.close()
+                    continue
                 self._ends += [near, far]
                 for a, b in ((near, far), (far, near)):
                     threading.Thread(target=self._carry, args=(a, b), daemon=True).start()

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.request
 
 import numpy as np
@@ -77,6 +78,14 @@ def only_recording(server):
     return server.get(f"{recordings}/{recording['id']}").splitlines()
 
 
+def assert_stored_whole(bench, server, samples):
+    """At least so many samples are in the only recording: in the device's order, each once, none left out."""
+    sent, stored = bench.sent(), frames(only_recording(server))
+    assert len(stored) >= samples
+    first = sent.index(stored[0])
+    assert stored == sent[first : first + len(stored)]
+
+
 def test_a_full_disk_at_the_server_costs_nothing(bench, real_server, eventually):
     bench.virtual()
     bridge = bench.bridge()
@@ -92,9 +101,31 @@ def test_a_full_disk_at_the_server_costs_nothing(bench, real_server, eventually)
     bench.samples(50)
     bridge.type("*q")
     assert bridge.wait() == 0
-    places = [bench.sent().index(frame) for frame in frames(only_recording(real_server))]
-    assert len(places) >= 200
-    assert places == list(range(places[0], places[-1] + 1))
+    assert_stored_whole(bench, real_server, 200)
+
+
+def test_a_network_that_is_cut_for_a_minute_is_told_once_and_costs_nothing(bench, real_server, new_cable, eventually):
+    """Both ends stay open, nothing comes through: what a cut network looks like. For a minute in real time: both sides
+    miss pings, the server gives the connection up, and the pauses between attempts grow to their longest."""
+    cable = new_cable(real_server.port)
+    bench.server.port = cable.port
+    bench.virtual()
+    bridge = bench.bridge("--rate", "50")
+    bridge.says("server: live")
+    bridge.says("device: live")
+    bridge.type("-")
+    bench.samples(50)
+    cable.cut, since, already = True, time.monotonic(), len(bench.sent())
+    while time.monotonic() < since + 60:
+        bench.samples(50)
+    assert "server: searching" in bridge.said
+    cable.cut, meanwhile = False, len(bench.sent()) - already
+    eventually(lambda: bridge.said.count("server: live") == 2)
+    bench.samples(20)
+    bridge.type("*q")
+    assert bridge.wait() == 0
+    assert bridge.said.count("server: stale") == 1
+    assert_stored_whole(bench, real_server, 70 + meanwhile)
 
 
 def test_server_and_bridge_killed_in_mid_curve(bench, real_server):

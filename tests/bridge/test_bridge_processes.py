@@ -115,27 +115,6 @@ def test_what_the_network_lost_is_sent_again(bench):
     assert bridge.said.count("server: lost") == 2
 
 
-def test_a_network_that_is_cut_is_told_once_and_costs_nothing(bench, new_cable, eventually):
-    """Both ends stay open, nothing comes through: what a cut network looks like. For a minute in real time: pings are
-    missed, and the pauses between attempts grow to their longest."""
-    cable = new_cable(bench.server.port)
-    bench.server.port = cable.port
-    bench.virtual()
-    bridge = bench.bridge("--rate", "50")
-    record_a_curve(bench, bridge)
-    cable.cut = True
-    for _ in range(6):
-        bench.samples(500)
-    assert "server: searching" in bridge.said
-    cable.cut = False
-    eventually(lambda: bridge.said.count("server: live") == 2)
-    bench.samples(20)
-    bridge.type(".q")
-    assert bridge.wait() == 0
-    assert bridge.said.count("server: stale") == 1
-    assert is_slice(bench.server.frames(0), bench.sent())
-
-
 def test_without_a_server_it_records_and_sends_later(bench, make_server):
     bench.virtual()
     address, bench.server.port = bench.server.port, 1
