@@ -41,7 +41,10 @@ def add(commands: Commands) -> None:
     )  # fmt: skip
     option("--calibration", type=Path, metavar="CAL.json", help="of this device: have the recording corrected by it")
     command = add_command(
-        commands, "calibrate", "find out what a Morphorider's sensors and wheel get wrong", _calibrate
+        commands,
+        "calibrate",
+        "find out what a Morphorider's sensors and wheel get wrong (not a phone's: it calibrates itself)",
+        _calibrate,
     )
     add_port(command)
     option = command.add_argument
