@@ -13,7 +13,7 @@ import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from playwright.sync_api import Browser, CDPSession, Page, expect, sync_playwright
@@ -31,6 +31,7 @@ FLAGS = [
     *("--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader"),
 ]
 DESK, PHONE = {"width": 1280, "height": 760}, {"width": 390, "height": 844}
+SENSORS = ["accelerometer", "gyroscope", "magnetometer"]
 LOOKS = ("Shaded", "Isophotes", "Reflection lines", "Normal map", "Mean curvature", "Gaussian curvature")
 PATIENCE = 60_000
 """ms until something that should be seen counts as missing."""
@@ -146,27 +147,58 @@ def show_theme_and_phone(browser: Browser, address: str) -> None:
     dark.goto(address)
     expect(dark.locator("canvas")).to_have_attribute("data-surface", "shown")
     keep(dark, "dark")
+    show_problems(dark)
+    dark.get_by_role("link", name="tracemesh").click()
+    keep(dark, "dark-sessions")
     dark.close()
     phone = browser.new_page(viewport=PHONE, device_scale_factor=2, reduced_motion="reduce")
     phone.goto(address.replace("/#/sessions/", "/scan.html#"))
     keep(phone, "scan-start")
     phone.close()
-    show_air(browser, address.split("/#/")[0])
+    origin = address.split("/#/")[0]
+    show_curve(browser, origin)
+    show_refusal(browser, origin)
+    show_air(browser, origin)
+
+
+def show_problems(page: Page) -> None:
+    """A curve that bounds nothing is called a boundary, until it has been seen."""
+    page.get_by_role("button", name="2 interior").click()
+    page.get_by_role("button", name="Make boundary").click()
+    expect(page.locator("main svg polyline.flag")).to_have_count(2)
+    keep(page, "dark-problems")
+    page.get_by_role("button", name="Undo").click()
+    expect(page.locator("main svg .flag")).to_have_count(0)
+
+
+def show_curve(browser: Browser, origin: str) -> None:
+    """A curve while it is scanned, its first node marked, in the dark theme."""
+    phone, hand = held(browser, origin, "Lamp shade", "dark")
+    phone.get_by_role("button", name="Start curve").click()
+    lead(phone, hand, 0.1, 0.2)
+    phone.get_by_role("button", name="Mark node").click()
+    lead(phone, hand, 0.2, 3.0)
+    shoot(phone, "scan-curve")
+    phone.close()
+
+
+def show_refusal(browser: Browser, origin: str) -> None:
+    """The sensors may not be read, in the dark theme."""
+    context = browser.new_context(viewport=PHONE, device_scale_factor=2, color_scheme="dark", permissions=[])
+    phone = context.new_page()
+    devtools = context.new_cdp_session(phone)
+    for sensor in SENSORS:
+        devtools.send("Browser.setPermission", {"permission": {"name": sensor}, "setting": "denied"})
+    phone.goto(f"{origin}/scan.html#{create(origin, 'Vase')}")
+    phone.get_by_role("button", name="Use this device's sensors").click()
+    expect(phone.get_by_role("alert")).to_be_visible()
+    shoot(phone, "scan-refused")
+    context.close()
 
 
 def show_air(browser: Browser, origin: str) -> None:
-    """Two strokes drawn in the air, the browser's own orientation sensor overridden; it goes on moving."""
-    request = urllib.request.Request(f"{origin}/api/v1/sessions", b'{"id": "air", "name": "In the air"}')
-    request.add_header("Content-Type", "application/json")
-    urllib.request.urlopen(request, timeout=20).close()
-    granted = ["accelerometer", "gyroscope", "magnetometer"]
-    phone = browser.new_page(viewport=PHONE, device_scale_factor=2, reduced_motion="reduce", permissions=granted)
-    hand = phone.context.new_cdp_session(phone)
-    sensor, metadata = "absolute-orientation", {"available": True, "maximumFrequency": 60, "minimumFrequency": 1}
-    hand.send("Emulation.setSensorOverrideEnabled", {"enabled": True, "type": sensor, "metadata": metadata})
-    phone.goto(f"{origin}/scan.html#air")
-    phone.get_by_role("button", name="Use this device's sensors").click()
-    lead(phone, hand, 0.0, 0.1)
+    """Two strokes drawn in the air; the hand goes on moving."""
+    phone, hand = held(browser, origin, "In the air", "light")
     phone.get_by_role("button", name="in the air").click()
     for start, end in ((0.0, 2.4), (2.4, 4.2)):
         phone.get_by_role("button", name="Hold to draw").hover()
@@ -176,6 +208,30 @@ def show_air(browser: Browser, origin: str) -> None:
     lead(phone, hand, 4.2, 4.8)
     shoot(phone, "scan-in-the-air")
     phone.close()
+
+
+def held(browser: Browser, origin: str, name: str, theme: Literal["light", "dark"]) -> tuple[Page, CDPSession]:
+    """A phone that reads the browser's own orientation sensor, overridden, into a new session."""
+    granted = [*SENSORS, "screen-wake-lock"]
+    phone = browser.new_page(
+        viewport=PHONE, device_scale_factor=2, reduced_motion="reduce", permissions=granted, color_scheme=theme
+    )
+    hand = phone.context.new_cdp_session(phone)
+    sensor, metadata = "absolute-orientation", {"available": True, "maximumFrequency": 60, "minimumFrequency": 1}
+    hand.send("Emulation.setSensorOverrideEnabled", {"enabled": True, "type": sensor, "metadata": metadata})
+    phone.goto(f"{origin}/scan.html#{create(origin, name)}")
+    phone.get_by_role("button", name="Use this device's sensors").click()
+    lead(phone, hand, 0.0, 0.1)
+    return phone, hand
+
+
+def create(origin: str, name: str) -> str:
+    """A new session of this name."""
+    request = urllib.request.Request(f"{origin}/api/v1/sessions", json.dumps({"name": name}).encode())
+    request.add_header("Content-Type", "application/json")
+    with urllib.request.urlopen(request, timeout=20) as answer:
+        made: str = json.load(answer)["id"]
+    return made
 
 
 def lead(phone: Page, hand: CDPSession, start: float, end: float) -> None:

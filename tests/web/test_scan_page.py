@@ -138,6 +138,8 @@ def test_a_refused_permission_is_told(server: Server, browser: Browser) -> None:
     page.goto(server.page(f"scan.html#{session}"))
     page.get_by_role("button", name="Use this device's sensors").click()
     expect(page.get_by_role("alert")).to_contain_text("may not read the motion sensors")
+    expect(page.get_by_role("status")).to_have_text("live")
+    expect(page.get_by_text("screen lock")).to_be_hidden()
     context.close()
 
 

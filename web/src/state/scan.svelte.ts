@@ -116,12 +116,12 @@ export class ScanStore {
       failed: (words) => {
         this.sensing = false;
         this.problem = words;
+        void this.#wakeLock?.release();
       },
     });
     await this.#opened;
     const id = newName(source.kind);
     if (!this.#recorder) await this.#resume(freshRecording(id, { id, ...source.device }));
-    await this.stayAwake();
   }
 
   /** Keep the screen on while sensors are read: a dark screen stops them. */
@@ -230,6 +230,7 @@ export class ScanStore {
 
   #take(reading: Reading): void {
     this.#readings += 1;
+    if (!this.sensing) void this.stayAwake();
     this.sensing = true;
     void this.#recorder?.add(reading);
   }
