@@ -13,6 +13,12 @@ FLOATING = "main > .tools, main > figure, main > .problem, main > .scale"
 BOXES = """(group) =>
   [...document.querySelectorAll(group)].map((e) => e.getBoundingClientRect().toJSON()).filter((box) => box.height)"""
 """All in the same moment: a panel grows when something comes in."""
+FITS = """() => {
+  const canvas = document.querySelector("main > canvas");
+  const fits = canvas.width === canvas.clientWidth && canvas.height === canvas.clientHeight;
+  return fits && !document.querySelector(".strip");
+}"""
+"""The plot is closed, and the view has taken its place."""
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +57,9 @@ def test_nothing_covers_anything(
     expect(page.get_by_role("heading", name="Curvature along curve")).to_be_visible()
     expect(page.get_by_role("slider", name="Place on curve 1")).to_be_visible()
     _check(page, width)
-    for key in ("p", "0"):
-        page.keyboard.press(key)
+    page.keyboard.press("p")
+    page.wait_for_function(FITS)  # what is seen whole is so in a view of this size
+    page.keyboard.press("0")
     page.wait_for_timeout(300)
     _check_gauss_map(page)
     boundary, background = share_of_pixels(view, "curve-boundary", "view")
