@@ -19,7 +19,7 @@ from websockets.sync.client import ClientConnection
 from tracemesh.formats.recordings import Recording
 from tracemesh.wire.device import Samples
 
-PATIENCE = 60.0
+PATIENCE = 120.0
 """s until a test gives up waiting."""
 BLOCK = 60
 """Samples in one message: one second of a Morphorider."""

@@ -83,6 +83,8 @@ def test_the_keyboard_reaches_everything_in_reading_order(server: Server, page: 
         page.goto(server.page(f"#/sessions/{session}"))
         expect(page.locator("canvas").first).to_have_attribute("data-surface", "shown")
         expect(page.get_by_role("button", name="5 interior")).to_be_visible()
+        expect(page.get_by_role("button", name="Edit nodes")).to_be_enabled()
+        expect(page.get_by_role("button", name="Edit node 10")).to_be_visible()
         _check_order(page, order)
     _check_sheet(page)
 
