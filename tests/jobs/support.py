@@ -4,7 +4,8 @@ import os
 import signal
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from tracemesh.storage.database import Database
@@ -82,6 +83,18 @@ def kill(pids: list[int]) -> None:
     for pid in pids:
         os.kill(pid, signal.SIGKILL)
     wait_for_end(pids)
+
+
+@contextmanager
+def paused(pids: list[int]) -> Iterator[None]:
+    """Processes that neither work nor answer meanwhile."""
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
 
 
 def wait_for_end(pids: list[int]) -> None:

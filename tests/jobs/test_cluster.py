@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 from tests.jobs.conftest import DaskCluster
-from tests.jobs.support import LONG, kill, look, queue, row, until, wait, wait_until_it_works
+from tests.jobs.support import LONG, kill, look, paused, queue, row, until, wait, wait_until_it_works
+from tracemesh.errors import ClusterAway
+from tracemesh.jobs.cluster import Cluster
 from tracemesh.jobs.runner import JobRunner
 from tracemesh.settings import Settings
 from tracemesh.storage.database import Database
@@ -48,6 +50,16 @@ def test_jobs_wait_for_a_scheduler_that_is_away(start: Start, database: Database
         cluster.stop()
 
 
+def test_a_scheduler_that_hangs_is_away(executor: str, dask_cluster: DaskCluster) -> None:
+    cluster = Cluster(executor.replace("dask", "tcp"))
+    cluster.connect()
+    assert dask_cluster.scheduler is not None
+    with paused([dask_cluster.scheduler.pid]):
+        with pytest.raises(ClusterAway, match="does not answer"):
+            cluster.connect()
+        cluster.close()
+
+
 SERVER = """
 import sys, time
 from tracemesh.jobs.runner import JobRunner
@@ -62,11 +74,15 @@ time.sleep(600)
 
 
 @pytest.mark.usefixtures("quick_lease")
-def test_a_job_of_a_killed_server_is_done_by_the_next(start: Start, database: Database, settings: Settings) -> None:
+def test_a_job_of_a_killed_server_is_done_by_the_next(
+    start: Start, database: Database, settings: Settings, dask_cluster: DaskCluster
+) -> None:
+    """With workers alive its attempt might end by itself."""
     job = queue(database, step=LONG)
     with subprocess.Popen([sys.executable, "-c", SERVER, settings.model_dump_json()]) as server:
         wait_until_it_works(database, job)
         server.kill()
+    kill(dask_cluster.pids())
     assert look(database, job).state == "running"
     start()
     assert wait(database, job).state == "done"

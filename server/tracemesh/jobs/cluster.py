@@ -16,8 +16,8 @@ from distributed import Future as DaskFuture
 from tracemesh.errors import ClusterAway
 
 T = TypeVar("T")
-CONNECT_TIMEOUT = 5
-"""s to wait for the scheduler."""
+PATIENCE = 5
+"""s to wait for each answer of the scheduler; dask itself may wait for ever, above all while it closes."""
 
 
 class Cluster:
@@ -35,7 +35,7 @@ class Cluster:
     def connect(self) -> None:
         """Be connected to a scheduler that has workers; raises ClusterAway."""
         try:
-            there = self._connected().nthreads()
+            there = self._connected().nthreads(callback_timeout=PATIENCE)
         except (OSError, RuntimeError) as error:
             raise ClusterAway(self._away(error)) from None
         if not there:
@@ -72,7 +72,7 @@ class Cluster:
                 return self._client
             self._leave()
             try:
-                self._client = Client(self._address, timeout=CONNECT_TIMEOUT, set_as_default=False, name="tracemesh")
+                self._client = Client(self._address, timeout=PATIENCE, set_as_default=False, name="tracemesh")
             except (OSError, TimeoutError) as error:
                 raise ClusterAway(self._away(error)) from None
             return self._client
@@ -81,21 +81,30 @@ class Cluster:
         client, self._client = self._client, None
         if client is not None:
             with suppress(OSError, TimeoutError):  # the scheduler is gone already
-                client.close(timeout=CONNECT_TIMEOUT)
+                client.close(timeout=PATIENCE)
 
     def _away(self, error: Exception) -> str:
         return f"the scheduler at {self._address} does not answer: {error}"
 
 
 def _hand_over(done: DaskFuture[T], outer: "Future[T]") -> None:
-    """Give a future's end to another one, in the words of the standard library."""
-    if done.status == "finished":
-        outer.set_result(done.result())
-        return
-    error = done.exception() if done.status == "error" else None
-    if error is None:
-        outer.set_exception(ClusterAway("the scheduler was lost"))
-    elif isinstance(error, KilledWorker):
-        outer.set_exception(BrokenExecutor("the worker was lost"))
-    else:
+    """Give a future's end to another one."""
+    try:
+        outer.set_result(_result(done))
+    except Exception as error:
         outer.set_exception(error)
+
+
+def _result(done: DaskFuture[T]) -> T:
+    """What it ended with, in the words of the standard library."""
+    try:
+        if done.status == "finished":
+            return done.result(PATIENCE)
+        error = done.exception(PATIENCE) if done.status == "error" else None
+    except TimeoutError:
+        error = None
+    if error is None:
+        raise ClusterAway("the scheduler was lost")
+    if isinstance(error, KilledWorker):
+        raise BrokenExecutor("the worker was lost")
+    raise error
