@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from tracemesh.errors import Overtaken, Refused
 from tracemesh.storage.curves import get_curve, list_curves, update_curve
 from tracemesh.storage.database import Database
+from tracemesh.storage.devices import list_devices, seen
 from tracemesh.storage.ingest import Group, commit, open_recording
 from tracemesh.storage.models import MessageRow, RecordingRow, SessionRow, new_id
 from tracemesh.storage.readings import list_readings
@@ -283,6 +284,22 @@ def test_servers_count_the_readings_of_one_session_together(database: Database) 
             commit(transaction, group, owner)
     with database.read() as transaction:
         assert list_readings(transaction, session, 0, 10).times == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_a_device_that_nobody_knew_comes_to_two_servers_at_once(database: Database) -> None:
+    def begin() -> None:
+        with database.write() as transaction:
+            open_recording(transaction, HELLO, HELLO.model_dump_json().encode())
+
+    other = Thread(target=begin)
+    with database.write() as transaction:
+        seen(transaction, HELLO.device)
+        other.start()
+        other.join(0.5)  # enough for it where nothing holds it up
+    other.join()
+    with database.read() as transaction:
+        assert transaction.scalars(select(RecordingRow)).one().id == "r"
+        assert [device.id for device in list_devices(transaction)] == ["d"]
 
 
 def test_a_mark_of_the_device_and_an_edit_of_the_page_are_both_kept(database: Database) -> None:

@@ -1,6 +1,9 @@
 """Devices that were seen here, their calibrations, and which of these a recording uses."""
 
+from contextlib import suppress
+
 from sqlalchemy import func, select
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session as Transaction
 
 from tracemesh.errors import Conflict, NotFound
@@ -96,9 +99,9 @@ def _device_row(transaction: Transaction, identifier: str) -> DeviceRow:
     row = transaction.get(DeviceRow, identifier)
     if row is None:
         row = DeviceRow(id=identifier, kind="", name="", last_version=0, first_seen=now(), last_seen=now())
-        transaction.add(row)
-        transaction.flush()
-    return row
+        with suppress(IntegrityError), transaction.begin_nested():  # another server may see it for the first time, too
+            transaction.add(row)
+    return transaction.get_one(DeviceRow, identifier)
 
 
 def _existing(transaction: Transaction, identifier: str) -> DeviceRow:
