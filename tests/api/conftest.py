@@ -40,7 +40,8 @@ class RunningServer:
         self.http = httpx.Client(base_url=f"http://127.0.0.1:{self.port}/api/v1", headers=headers, timeout=60)
 
     def connect(self, path: str, **options: Any) -> connect:
-        return connect(f"ws://127.0.0.1:{self.port}/api/v1{path}", max_size=None, compression=None, **options)
+        own = {"max_size": None, "compression": None, "open_timeout": 60, **options}
+        return connect(f"ws://127.0.0.1:{self.port}/api/v1{path}", **own)
 
     def new_session(self, **body: str) -> str:
         return str(self.http.post("/sessions", json=body).json()["id"])
@@ -57,7 +58,7 @@ class Rider:
         self.welcome = self.receive()
 
     def receive(self) -> dict[str, Any]:
-        answer = json.loads(self.socket.recv(timeout=20))
+        answer = json.loads(self.socket.recv(timeout=60))
         assert isinstance(answer, dict)
         return answer
 

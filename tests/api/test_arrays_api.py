@@ -184,12 +184,12 @@ def test_a_killed_server_loses_no_acknowledged_reading(server_process: Any) -> N
     acknowledged = -1
     with server.connect("/ingest") as socket:
         socket.send(hello)
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         sender = threading.Thread(target=_send_all, args=(socket, messages))
         sender.start()
         try:
             while True:
-                acknowledged = json.loads(socket.recv(timeout=20))["seq"]
+                acknowledged = json.loads(socket.recv(timeout=60))["seq"]
                 if acknowledged > 50:
                     server_process.kill()
         except (ConnectionClosed, OSError):
@@ -200,11 +200,11 @@ def test_a_killed_server_loses_no_acknowledged_reading(server_process: Any) -> N
     assert server.http.get(f"/sessions/{session}/readings").json()["count"] > acknowledged
     with server.connect("/ingest") as socket:
         socket.send(hello)
-        next_seq = json.loads(socket.recv(timeout=20))["next_seq"]
+        next_seq = json.loads(socket.recv(timeout=60))["next_seq"]
         assert next_seq > acknowledged
         for text in messages[next_seq:]:
             socket.send(text)
-        while json.loads(socket.recv(timeout=20))["seq"] < len(messages) - 1:
+        while json.loads(socket.recv(timeout=60))["seq"] < len(messages) - 1:
             pass
     assert server.http.get(f"/sessions/{session}/recordings/r").text == "\n".join([hello, *messages]) + "\n"
     assert server.http.get(f"/sessions/{session}/readings").json()["times"] == [n / 1000 for n in range(2000)]

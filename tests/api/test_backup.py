@@ -47,12 +47,12 @@ def test_a_backup_under_load_can_be_served_and_has_all_that_was_acknowledged_bef
     stop = threading.Event()
     with server.connect("/ingest") as socket:
         socket.send(json.dumps(hello))
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         sender = threading.Thread(target=_send, args=(socket, line(200_000, block=5), stop))
         sender.start()
         acknowledged = 0
         while acknowledged < 100:
-            acknowledged = json.loads(socket.recv(timeout=20))["seq"]
+            acknowledged = json.loads(socket.recv(timeout=60))["seq"]
         made = [run("backup", copy, "--data-dir", plain_server_process.data_dir) for _ in range(2)]
         stop.set()
         sender.join()

@@ -35,12 +35,12 @@ def _send_until_killed(server_process: Any, server: Any, hello: str, messages: l
     acknowledged = -1
     with server.connect("/ingest") as socket:
         socket.send(hello)
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         sender = threading.Thread(target=_send_all, args=(socket, messages))
         sender.start()
         try:
             while True:
-                acknowledged = json.loads(socket.recv(timeout=20))["seq"]
+                acknowledged = json.loads(socket.recv(timeout=60))["seq"]
                 if acknowledged > 50:
                     server_process.kill()
         except (ConnectionClosed, OSError):
@@ -80,14 +80,14 @@ def test_a_graceful_stop_commits_what_was_accepted(server_process: Any, line: An
     messages = [json.dumps(m) for m in line(500)]
     with server.connect("/ingest") as socket:
         socket.send(_hello(session))
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         for text in messages:
             socket.send(text)
         server_process.process.send_signal(signal.SIGTERM)
         acknowledged = -1
         with pytest.raises(ConnectionClosed):
             while True:
-                acknowledged = json.loads(socket.recv(timeout=20))["seq"]
+                acknowledged = json.loads(socket.recv(timeout=60))["seq"]
     server_process.process.wait(20)
     server = server_process.start()
     assert server.http.get(f"/sessions/{session}/recordings/r").text.count("\n") - 2 >= acknowledged
@@ -119,10 +119,10 @@ def _send_until_refused(server: Any, hello: str, messages: list[str]) -> tuple[i
     acknowledged = -1
     with server.connect("/ingest") as socket:
         socket.send(hello)
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         sender = threading.Thread(target=_send_all, args=(socket, messages))
         sender.start()
-        while (answer := json.loads(socket.recv(timeout=20)))["type"] == "ack":
+        while (answer := json.loads(socket.recv(timeout=60)))["type"] == "ack":
             acknowledged = answer["seq"]
         sender.join()
     return acknowledged, answer
@@ -132,11 +132,11 @@ def _send_the_rest(server: Any, hello: str, messages: list[str], acknowledged: i
     """As a device does that was cut off: from where the server wants it."""
     with server.connect("/ingest") as socket:
         socket.send(hello)
-        next_seq = json.loads(socket.recv(timeout=20))["next_seq"]
+        next_seq = json.loads(socket.recv(timeout=60))["next_seq"]
         assert next_seq > acknowledged
         for text in messages[next_seq:]:
             socket.send(text)
-        while json.loads(socket.recv(timeout=20))["seq"] < len(messages) - 1:
+        while json.loads(socket.recv(timeout=60))["seq"] < len(messages) - 1:
             pass
 
 
@@ -156,11 +156,11 @@ def test_postgresql_crashes_under_a_device(start_server: Any, postgresql: Any, l
     while acknowledged < len(messages) - 1:
         with server.connect("/ingest") as socket:
             socket.send(hello)
-            answer = json.loads(socket.recv(timeout=20))
+            answer = json.loads(socket.recv(timeout=60))
             for text in messages[answer.get("next_seq", len(messages)) :]:
                 try:
                     socket.send(text)
-                    answer = json.loads(socket.recv(timeout=20))
+                    answer = json.loads(socket.recv(timeout=60))
                 except ConnectionClosed:
                     break
                 acknowledged = answer.get("seq", acknowledged)

@@ -103,7 +103,7 @@ def test_version_and_session_are_checked_first(server: Any) -> None:
     ]:
         with server.connect("/ingest") as socket:
             socket.send(json.dumps({"type": "hello", **hello}))
-            assert json.loads(socket.recv(timeout=10))["code"] == code
+            assert json.loads(socket.recv(timeout=60))["code"] == code
 
 
 def test_limits(start_server: Callable[..., Any], ride: Ride, line: Line) -> None:

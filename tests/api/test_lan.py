@@ -81,7 +81,7 @@ def test_sockets_are_secure_too(lan: LanServer) -> None:
     url = lan.address("https").replace("https", "wss")
     with connect(f"{url}/api/v1/ingest", ssl=lan.trust, additional_headers=headers) as device:
         device.send("[]")
-        assert "malformed" in str(device.recv(timeout=20))
+        assert "malformed" in str(device.recv(timeout=60))
 
 
 def test_plain_http_leads_to_https_and_drops_what_was_secret(lan: LanServer) -> None:

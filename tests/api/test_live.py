@@ -16,7 +16,7 @@ def watch(socket: Any, until: Callable[[dict[str, Any]], bool], limit: int = 100
     """Messages up to and including the first that fits."""
     seen: list[dict[str, Any]] = []
     for _ in range(limit):
-        seen.append(json.loads(socket.recv(timeout=30)))
+        seen.append(json.loads(socket.recv(timeout=60)))
         if until(seen[-1]):
             return seen
     raise AssertionError([m["type"] for m in seen])
@@ -196,7 +196,7 @@ def test_a_browser_that_does_not_read_delays_nobody(server: Any, ride: Any, line
 
 def test_an_unknown_session_is_told(server: Any) -> None:
     with server.connect("/sessions/nowhere/live") as socket, pytest.raises(Exception, match="4404"):
-        socket.recv(timeout=10)
+        socket.recv(timeout=60)
 
 
 def test_whoever_joins_at_any_moment_misses_nothing(server: Any, ride: Any, line: Any) -> None:
@@ -234,4 +234,4 @@ def test_a_deleted_session_sends_its_watchers_away(server: Any) -> None:
         with pytest.raises(Exception, match="1012"):
             watch(socket, lambda m: False)
     with server.connect(f"/sessions/{session}/live") as socket, pytest.raises(Exception, match="4404"):
-        socket.recv(timeout=10)
+        socket.recv(timeout=60)

@@ -46,9 +46,9 @@ def ask_for_much(client: httpx.Client, port: int) -> tuple[str, list[str]]:
     viewer = client.post("/api/v1/tokens", json={"role": "viewer"}, headers=owner).json()["token"]
     client.get("/api/v1/rights", params={"token": viewer})
     client.get("/api/v1/rights", headers={"Authorization": "Bearer a-wrong-token-in-a-header"})
-    with connect(f"ws://127.0.0.1:{port}/api/v1/ingest", additional_headers=owner) as device:
+    with connect(f"ws://127.0.0.1:{port}/api/v1/ingest", additional_headers=owner, open_timeout=60) as device:
         device.send('{"type": "dance", "token": "x"}')
-        device.recv(timeout=20)
+        device.recv(timeout=60)
     session = client.post("/api/v1/sessions", json={}, headers=owner).json()["id"]
     named = client.get(f"/api/v1/sessions/{session}", headers={**owner, "X-Request-ID": "of-the-proxy.1"})
     assert named.headers["X-Request-ID"] == "of-the-proxy.1"

@@ -78,7 +78,8 @@ def test_a_few_samples_do_not_wait_for_more(bench, eventually):
     record_a_curve(bench, bridge, 4)
     device.stop(signal.SIGTERM)
     bridge.says("device: lost")
-    eventually(lambda: bench.server.stored and bench.server.frames(0)[-1:] == bench.sent()[-1:])
+    # the answer on its way at the end is lost with the line
+    eventually(lambda: bench.server.stored and set(bench.server.frames(0)[-1:]) & set(bench.sent()[-2:]))
 
 
 @pytest.mark.parametrize("server_is_there", [True, False])
