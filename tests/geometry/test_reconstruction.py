@@ -172,7 +172,7 @@ def test_the_report_is_json_and_says_what_was_done(faulty_scan: Callable) -> Non
     assert report["parameters"]["bend_m"] > 0
     assert report["curve_bias"]["on"]
     assert report["frame_noise_deg"] == pytest.approx(np.degrees(0.02), rel=0.1)
-    assert set(report["seconds"]) >= {"cleaning", "weighing", "closing", "smoothing", "positions"}
+    assert set(report["seconds"]) >= {"measuring", "weighing", "closing", "smoothing", "positions"}
 
 
 def test_robust_loss_bears_scans_of_which_much_is_chance() -> None:

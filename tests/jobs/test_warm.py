@@ -24,6 +24,15 @@ def test_whatever_was_solved_before_the_network_is_that_of_a_fresh_start(bend: f
     assert warm.network.points == pytest.approx(reconstruct_network(scan, wanted).network.points, abs=1e-7)
 
 
+def test_one_scan_cut_again_is_measured_once_and_is_that_of_a_fresh_start() -> None:
+    scan, ready = exact_scan(leaf(), 0.01), WarmNetworks()
+    coarse, fine = (NetworkParameters(step_fraction=fraction) for fraction in (0.04, 0.02))
+    first, second = (ready.get(("leaf", parameters), scan, BUDGET) for parameters in (coarse, fine))
+    assert second.measured is first.measured
+    assert np.array_equal(second.solve().network.points, reconstruct_network(scan, fine).network.points)
+    assert ready.get(("other leaf", fine), scan, BUDGET).measured is not first.measured
+
+
 def test_a_scan_that_changed_is_made_ready_anew() -> None:
     scan, parameters = exact_scan(leaf(), 0.01), ReconstructionParameters(step="3%")
     larger = replace(scan, curves=tuple(replace(c, distance=2 * c.distance) for c in scan.curves))

@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 
 from tracemesh.geometry.curves.closed_curves import begun_at_nodes
+from tracemesh.geometry.curves.measured_scan import MeasuredScan
 from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkReconstruction, wanted_weights
 from tracemesh.geometry.scan import Scan
 from tracemesh.jobs.attached import SolvedNetwork, solved_network
@@ -50,12 +51,16 @@ class WarmNetworks:
     def get(self, key: Key, scan: Scan, budget: int) -> NetworkReconstruction:
         """The network of this key, made ready from the scan if it is not kept; raises ScanError."""
         if key not in self._networks:
-            made = NetworkReconstruction(scan, key[1])
+            made = NetworkReconstruction(self._measured(key[0]) or scan, key[1])
             self._networks[key] = made, FACTORS * bytes_of(made)
         self._networks.move_to_end(key)
         while len(self._networks) > 1 and sum(size for _, size in self._networks.values()) > budget:
             self._networks.popitem(last=False)
         return self._networks[key][0]
+
+    def _measured(self, loaded: str) -> MeasuredScan | None:
+        """That of a network which was made of the same scan with other parameters."""
+        return next((made.measured for (name, _), (made, _) in self._networks.items() if name == loaded), None)
 
 
 @cache

@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 
 from tracemesh.errors import ScanError
 from tracemesh.geometry.curves.assembly import assemble_network, per_point
-from tracemesh.geometry.curves.cleaning import CleanCurve, clean_curves
 from tracemesh.geometry.curves.closing import Closed, close_network
 from tracemesh.geometry.curves.energy import Weights
+from tracemesh.geometry.curves.measured_scan import MeasuredScan
 from tracemesh.geometry.curves.network_report import Misfit, bias_report, find_misfits
-from tracemesh.geometry.curves.placement import PlacedCurve, known_nodes, measured_layout, place_curve, uniform_layout
-from tracemesh.geometry.curves.polyline import MeasuredNetwork, measure_network, points_on_polyline
-from tracemesh.geometry.curves.positions import Positions, check_connected, solve_positions
+from tracemesh.geometry.curves.placement import PlacedCurve, uniform_layout
+from tracemesh.geometry.curves.polyline import points_on_polyline
+from tracemesh.geometry.curves.positions import Positions, solve_positions
 from tracemesh.geometry.curves.quadrature import edge_vectors
 from tracemesh.geometry.curves.regression import Regression, RegressionSolver
 from tracemesh.geometry.curves.resampling import PREFILTER, resample
 from tracemesh.geometry.curves.samples import Layout, NetworkSamples
-from tracemesh.geometry.curves.sketch import with_lengths
 from tracemesh.geometry.curves.uncertainty import point_uncertainty
 from tracemesh.geometry.curves.weights import choose_weights
 from tracemesh.geometry.network import CurveNetwork
@@ -31,11 +30,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 
-_STAGES = ("cleaning", "measuring", "resampling", "weighing", "closing", "smoothing", "positions", "uncertainty")
+_STAGES = ("measuring", "resampling", "weighing", "closing", "smoothing", "positions", "uncertainty")
 _FLATTEST = 1e-3  # diagonal over length of the curves that a step is still derived from
 _MOST_SAMPLES = 5_000_000
 _WIDEST = 25.0  # steps that a pre-filter may be wide: each sample sees a bounded number of measured ones
-_OPEN_GAP = 0.2  # of its length that a closed curve may lack as measured; a half circle lacks 0.64
 
 
 @dataclass(frozen=True)
@@ -99,23 +97,22 @@ class NetworkReconstruction:
     """A scan made ready, so that other smoothing lengths cost only what depends on them."""
 
     def __init__(
-        self, scan: Scan, parameters: NetworkParameters | None = None, progress: Progress | None = None
+        self,
+        scan: Scan | MeasuredScan,
+        parameters: NetworkParameters | None = None,
+        progress: Progress | None = None,
     ) -> None:
-        """Do all that comes before the regression; raises ScanError naming the curve that prevents it."""
+        """Do all that comes before the regression; raises ScanError naming the curve that prevents it.
+
+        Whoever cuts one scan again and again has it measured only once, by `measured` of the first.
+        """
         self._parameters = NetworkParameters() if parameters is None else parameters
         _check_parameters(self._parameters)
         self._stages = _Stages(progress)
-        self._stages.begin("cleaning")
-        self._cleaned = _cleaned(scan)
-        curves = tuple(place_curve(curve) for curve in self._cleaned)
-        self._indices = np.array([c.index for c in curves])
-        self._known_nodes = known_nodes(curves)
         self._stages.begin("measuring")
-        check_connected(measured_layout(curves), self._indices)
-        curves = with_lengths(curves)
-        self._measured = measure_network(curves, measured_layout(curves))
-        _check_closed(curves, self._measured)
-        self._step = _step(self._parameters, curves, self._measured)
+        self.measured = scan if isinstance(scan, MeasuredScan) else MeasuredScan(scan)
+        curves = self.measured.curves
+        self._step = _step(self._parameters, self.measured)
         self._prefilter = _prefilter(self._parameters, self._step)
         self._stages.begin("resampling")
         samples = resample(curves, uniform_layout(curves, self._step), self._step, self._prefilter)
@@ -130,7 +127,7 @@ class NetworkReconstruction:
 
     def _close(self, curves: Sequence[PlacedCurve], samples: NetworkSamples) -> Closed | None:
         """The network freed from errors of whole curves; None for a polyline, which is exact as it is."""
-        if self._measured.is_polyline:
+        if self.measured.network.is_polyline:
             return None
         return close_network(curves, samples, self._choice, self._step, self._prefilter, self._parameters.curve_bias)
 
@@ -144,9 +141,9 @@ class NetworkReconstruction:
         positions = self._positions(layout, regression.frames)
         self._stages.begin("uncertainty")
         uncertainty = per_point(layout, self._uncertainty(layout, positions, regression.frames))
-        network = assemble_network(layout, positions.points, regression.frames, uncertainty, self._indices)
-        loose = len(network.nodes) - len(self._known_nodes)
-        network = replace(network, node_numbers=np.append(self._known_nodes, np.full(loose, -1)))
+        network = assemble_network(layout, positions.points, regression.frames, uncertainty, self.measured.indices)
+        loose = len(network.nodes) - len(self.measured.known_nodes)
+        network = replace(network, node_numbers=np.append(self.measured.known_nodes, np.full(loose, -1)))
         self._stages.end()
         misfits = self._misfits(layout, positions)
         report = self._report(network, regression, positions, used, uncertainty)
@@ -155,21 +152,21 @@ class NetworkReconstruction:
 
     def _uncertainty(self, layout: Layout, positions: Positions, frames: Floats) -> Floats:
         if self._closed is None:
-            return np.full(layout.size, self._measured.chord_residual)
+            return np.full(layout.size, self.measured.network.chord_residual)
         closing, tangent = self._closed.closing, frames[:, :, 0]
         expected = point_uncertainty(closing.adjustment, layout, positions.points, tangent, closing.walk)
         return expected * closing.noise_factor(layout, positions.gaps)
 
     def _positions(self, layout: Layout, frames: Floats) -> Positions:
-        if self._measured.is_polyline:
-            return Positions(points_on_polyline(self._measured, layout), self._measured.positions.gaps)
+        if self.measured.network.is_polyline:
+            return Positions(points_on_polyline(self.measured.network, layout), self.measured.network.positions.gaps)
         covariance = self._closed.closing.covariance(layout) if self._closed else None
         return solve_positions(layout, edge_vectors(layout, frames), covariance)
 
     def _misfits(self, layout: Layout, positions: Positions) -> tuple[Misfit, ...]:
         if self._closed is None:
             return ()
-        return find_misfits(layout, positions.gaps, self._closed.closing.expected_gaps(layout), self._indices)
+        return find_misfits(layout, positions.gaps, self._closed.closing.expected_gaps(layout), self.measured.indices)
 
     def _report(
         self,
@@ -179,7 +176,7 @@ class NetworkReconstruction:
         weights: Weights,
         uncertainty: Floats,
     ) -> dict[str, object]:
-        layout, measured = self._samples.layout, self._measured
+        layout, polyline = self._samples.layout, self.measured.network.is_polyline
         gaps = np.linalg.norm(positions.gaps, axis=1)
         return {
             "parameters": {
@@ -189,12 +186,12 @@ class NetworkReconstruction:
                 "bend_m": weights.bend,
                 "robust": self._parameters.robust,
                 "curve_bias": "on" if self._closed and self._closed.found.variances.with_bias else "off",
-                "tangents": "chords to the next sample" if measured.is_polyline else "tangents of the curve",
+                "tangents": "chords to the next sample" if polyline else "tangents of the curve",
             },
             "sizes": {
-                "curves": len(self._cleaned),
-                "samples": sum(c.samples for c in self._cleaned),
-                "outliers": sum(c.dropped for c in self._cleaned),
+                "curves": len(self.measured.cleaned),
+                "samples": sum(c.samples for c in self.measured.cleaned),
+                "outliers": sum(c.dropped for c in self.measured.cleaned),
                 "points": len(network.points),
                 "nodes": len(network.nodes),
                 "segments": len(network.segments),
@@ -202,18 +199,12 @@ class NetworkReconstruction:
                 "diagonal_m": network.diagonal,
             },
             "frame_noise_deg": float(np.rad2deg(self._choice.noise)),
-            "curve_bias": bias_report(self._closed.found if self._closed else None, self._indices),
+            "curve_bias": bias_report(self._closed.found if self._closed else None, self.measured.indices),
             "closure": {"rms_m": float(np.sqrt(np.mean(gaps**2))), "max_m": float(gaps.max())},
             "uncertainty": {"mean_m": float(uncertainty.mean()), "max_m": float(uncertainty.max())},
             "regression": {"energy": regression.energy, "iterations": regression.iterations},
             "seconds": dict(self._stages.seconds),
         }
-
-
-def _cleaned(scan: Scan) -> tuple[CleanCurve, ...]:
-    if not scan.curves:
-        raise ScanError("the scan holds no curve")
-    return clean_curves(scan.curves)
 
 
 def _check_parameters(parameters: NetworkParameters) -> None:
@@ -226,9 +217,9 @@ def _check_parameters(parameters: NetworkParameters) -> None:
             )
 
 
-def _step(parameters: NetworkParameters, curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> float:
-    length = sum(curve.length for curve in curves)
-    step = parameters.step_fraction * max(measured.diagonal, _FLATTEST * length)
+def _step(parameters: NetworkParameters, measured: MeasuredScan) -> float:
+    length = sum(curve.length for curve in measured.curves)
+    step = parameters.step_fraction * max(measured.network.diagonal, _FLATTEST * length)
     step = step if parameters.step is None else parameters.step
     if step > length:
         raise ScanError(f"a step of {step:.3g} m is longer than all curves together, {length:.3g} m")
@@ -244,19 +235,6 @@ def _prefilter(parameters: NetworkParameters, step: float) -> float:
     if wanted is not None and wanted > _WIDEST * step:
         raise ScanError(f"wanted a pre-filter of at most {_WIDEST:g} steps, {_WIDEST * step:.3g} m, got {wanted:.3g} m")
     return PREFILTER * step if wanted is None else wanted
-
-
-def _check_closed(curves: Sequence[PlacedCurve], measured: MeasuredNetwork) -> None:
-    """Raise ScanError for the first closed curve whose tangents do not lead back to its start."""
-    for i, curve in enumerate(curves):
-        missing = measured.displacement(i)
-        if curve.closed and missing > _OPEN_GAP * curve.length:
-            raise ScanError(
-                f"{curve_name(curve.index)} is marked as closed, but ends {missing:.3g} m from where it began "
-                f"({100 * missing / curve.length:.0f} % of its length)",
-                (curve.index,),
-                "open",
-            )
 
 
 def wanted_weights(parameters: NetworkParameters) -> Weights | None:
