@@ -1,8 +1,11 @@
 """Worker processes: what they may take, what they are copies of, and what becomes of them."""
 
 import os
+import resource
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
@@ -45,6 +48,32 @@ def test_a_lost_origin_is_made_anew_and_leaves_no_orphan(slots: list[Slot]) -> N
     kill([before])
     with pytest.raises(BrokenExecutor):
         until(lambda: slots[0].submit(int).result() != 0)
-    slots[0].renew()
     wait_for_end([worker])
-    assert [slots[0].submit(os.getppid).result()] == origins() != [before]
+    assert [_origin(slots[0])] == origins() != [before]
+
+
+def _origin(slot: Slot) -> int:
+    """Of its process; as whoever has work does, once more where it was lost just now."""
+    found: list[int] = []
+
+    def ask() -> bool:
+        slot.renew()
+        with suppress(BrokenExecutor):
+            found.append(slot.submit(os.getppid).result())
+        return bool(found)
+
+    until(ask)
+    return found[0]
+
+
+def test_what_cannot_be_started_is_lost_not_wrong(slots: list[Slot]) -> None:
+    """No process is left to be had: with BrokenExecutor the job waits for the next attempt."""
+    begun = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (len(list(Path("/proc/self/fd").iterdir())), begun[1]))
+    try:
+        with pytest.raises(BrokenExecutor):
+            slots[0].submit(int)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, begun)
+    slots[0].renew()
+    assert slots[0].submit(int).result() == 0

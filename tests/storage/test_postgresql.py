@@ -51,12 +51,12 @@ class Line:
                 sink.sendall(data)
 
     def cut(self) -> None:
-        for client in self._clients:
+        cut, self._clients = self._clients, []  # not those that come in answer
+        for client in cut:
             with suppress(OSError):
                 client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
                 client.shutdown(socket.SHUT_RD)
             client.close()
-        self._clients.clear()
 
     def close(self) -> None:
         self._listening.shutdown(socket.SHUT_RDWR)  # wakes who waits in accept

@@ -1,14 +1,12 @@
-"""No page has a fault that axe can find, in either theme."""
+"""No page has a fault that axe can find, in either theme; what is shown only meanwhile is looked at elsewhere."""
 
 import itertools
 from collections.abc import Callable
-from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
+from tests.web.axe import faults
 from tests.web.support import Rider, Server
-
-AXE = Path(__file__).resolve().parents[2] / "web/node_modules/axe-core/axe.min.js"
 
 
 def test_pages_are_accessible(server: Server, page: Page, rider: Callable[[str], Rider]) -> None:
@@ -18,11 +16,11 @@ def test_pages_are_accessible(server: Server, page: Page, rider: Callable[[str],
     server.call("POST", f"/sessions/{session}/reconstructions", {})
     page.goto(server.page())
     expect(page.get_by_role("link", name="Leaf")).to_be_visible()
-    assert _faults(page) == []
+    assert faults(page) == []
 
     page.goto(server.page(f"#/sessions/{empty}"))
     expect(page.get_by_text("Nothing scanned yet.")).to_be_visible()
-    assert _faults(page) == []
+    assert faults(page) == []
 
     page.goto(server.page(f"#/sessions/{session}"))
     expect(page.locator("canvas").first).to_have_attribute("data-surface", "shown")
@@ -31,20 +29,20 @@ def test_pages_are_accessible(server: Server, page: Page, rider: Callable[[str],
     page.get_by_label("Mean curvature").check()
     page.get_by_label("Curvature along a curve").check()
     expect(page.get_by_role("heading", name="Curvature along curve 2")).to_be_visible()
-    assert _faults(page) == []
+    assert faults(page) == []
     page.keyboard.press("e")
     page.get_by_role("button", name="Edit node 0").click()
     expect(page.get_by_role("list", name="Marks of node 0")).to_be_visible()
     page.get_by_role("button", name="Make boundary").click()
     expect(page.get_by_role("list", name="To mend")).to_be_visible()
-    assert _faults(page) == []
+    assert faults(page) == []
     page.keyboard.press("?")
     expect(page.get_by_role("dialog")).to_be_visible()
-    assert _faults(page) == []
+    assert faults(page) == []
 
     page.goto(server.page(f"scan.html#{session}"))
     expect(page.get_by_role("button", name="Use this device's sensors")).to_be_visible()
-    assert _faults(page) == []
+    assert faults(page) == []
 
 
 STOPS = """() => {
@@ -112,17 +110,3 @@ def _check_sheet(page: Page) -> None:
         assert page.evaluate("() => !document.activeElement.closest('header, main, aside')")
     page.keyboard.press("Escape")
     expect(opener).to_be_focused()
-
-
-def _faults(page: Page) -> list[str]:
-    """What axe finds in either theme, as 'theme: rule: element'."""
-    page.add_script_tag(path=AXE)
-    return [fault for theme in ("dark", "light") for fault in _faults_in(page, theme)]
-
-
-def _faults_in(page: Page, theme: str) -> list[str]:
-    found = page.evaluate(
-        "async theme => ((document.documentElement.dataset.theme = theme), (await axe.run()).violations)", theme
-    )
-    faults = ((fault, node) for fault in found for node in fault["nodes"])
-    return [f"{theme}: {fault['id']}: {node['html']} {node['failureSummary']}" for fault, node in faults]

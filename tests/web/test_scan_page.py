@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.web.axe import faults
 from tests.web.conftest import CHROMIUM, FLAGS, SENSORS
 from tests.web.phone import Hand, reconstructed, roundness
 from tests.web.support import PATIENCE, Server, free_port, running_server
@@ -58,6 +59,8 @@ def test_a_shape_is_drawn_in_the_air(server: Server, phone: Page) -> None:
     phone.get_by_role("button", name="Use this device's sensors").click()
     hand.lead(0, 0.01)
     phone.get_by_role("button", name="in the air").click()
+    expect(phone.get_by_role("button", name="Hold to draw")).to_be_visible()
+    assert faults(phone) == []
     draw(phone, hand, 0, np.pi)
     ends = phone.get_by_role("group", name="Node where the stroke ends")
     ends.get_by_role("button", name="0", exact=True).click()
@@ -110,6 +113,7 @@ def test_a_morphorider_is_read_without_a_bridge(server: Server, page: Page) -> N
     page.get_by_role("button", name="boundary").click()
     page.get_by_role("button", name="Start curve").click()
     expect(page.get_by_text(re.compile(r"^[1-9]\d\d samples$"))).to_be_visible()
+    assert faults(page) == []
     page.get_by_role("button", name="Stop curve").click()
     page.get_by_role("button", name="Done").click()
     expect(page).to_have_url(re.compile(f"#/sessions/{session}$"))

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
+from tests.web.axe import faults
 from tests.web.support import PATIENCE, Server, free_port, running_server
 
 TOKEN = "correct-horse-battery-staple"
@@ -85,6 +86,7 @@ def test_a_viewer_sees_the_session_and_nothing_to_change_it_with(
         expect(viewer.get_by_role("button", name=name)).to_have_count(0)
     viewer.get_by_role("button", name="1 boundary").click()
     expect(viewer.get_by_role("group", name="Edit curve 1")).to_have_count(0)
+    assert faults(viewer) == []
     assert viewer.evaluate(f"fetch('/api/v1/sessions/{made}', {{method: 'DELETE'}}).then((r) => r.status)") == 403
 
 
@@ -102,6 +104,7 @@ def test_a_phone_comes_in_by_a_code_that_opens_this_session_only(
     owner, made = session
     scan = link(owner, "Let a phone scan")
     expect(owner.get_by_role("img", name="QR code of the scan page")).to_be_visible()
+    assert faults(owner) == []
     phone = enter(scan)
     assert phone.url == closed.page(f"scan.html#{made}")
     expect(phone.get_by_role("heading", name="Lily")).to_be_visible()

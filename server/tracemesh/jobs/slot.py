@@ -38,15 +38,21 @@ class Slot:
     def submit(self, function: Callable[..., T], *arguments: object) -> Future[T]:
         """Run in the process; the future raises BrokenProcessPool when the process is lost.
 
-        Raises BrokenProcessPool when the slot is closed.
+        Raises BrokenProcessPool when the slot is closed, or when no process can be had just now.
         """
         with self._lock:
             if self._closed:
                 raise BrokenProcessPool("the slot is closed")
-            if self._pool is None:
-                begin = (dict(os.environ), self._niceness, self._memory)
-                self._pool = ProcessPoolExecutor(1, mp_context=_context(), initializer=_begin, initargs=begin)
-            return self._pool.submit(function, *arguments)
+            try:
+                return self._started().submit(function, *arguments)
+            except (OSError, EOFError) as error:
+                raise BrokenProcessPool(f"no process could be started: {error}") from None
+
+    def _started(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            begin = (dict(os.environ), self._niceness, self._memory)
+            self._pool = ProcessPoolExecutor(1, mp_context=_context(), initializer=_begin, initargs=begin)
+        return self._pool
 
     def renew(self) -> None:
         """End the process, if it was not lost; the next submission starts another one."""

@@ -35,6 +35,13 @@ export class ApiProblem extends Error {
   }
 }
 
+/** An error in words for the person in front of the screen. */
+export function inWords(error: unknown): string {
+  if (error instanceof ApiProblem) return error.message;
+  if (error instanceof TypeError) return "The server does not answer. Is it running?";
+  return error instanceof Error ? error.message : String(error);
+}
+
 type Body = string | Blob;
 
 /** As many things as the server lists at once. */

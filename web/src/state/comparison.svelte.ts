@@ -1,8 +1,7 @@
 import { symmetricRange } from "../geometry/colormaps";
-import { type Api, ApiProblem } from "../protocol/api";
+import { type Api, ApiProblem, inWords } from "../protocol/api";
 import type { Comparison, ComparisonProgress } from "../wire.gen";
 import type { Field } from "./fields";
-import { inWords } from "./session.svelte";
 
 /** How the surface is laid on the truth before it is measured. */
 export type Alignment = "rigid" | "similarity" | "none";

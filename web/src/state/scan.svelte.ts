@@ -1,4 +1,4 @@
-import type { Api } from "../protocol/api";
+import { type Api, inWords } from "../protocol/api";
 import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
 import type { Reading, Source, StopSource } from "../protocol/source";
 import { DurableSpool, type RecordingState } from "../protocol/spool";
@@ -7,7 +7,6 @@ import type { Hello } from "../wire.gen";
 import { mergedNumbers, Network } from "./network";
 import { newName } from "./names";
 import { freshRecording, Recorder } from "./recorder";
-import { inWords } from "./session.svelte";
 
 const READINGS_INTERVAL = 500;
 const BUZZ = 40;

@@ -1,4 +1,4 @@
-import { type Api, ApiProblem } from "../protocol/api";
+import { type Api, ApiProblem, inWords } from "../protocol/api";
 import { type Connection, LiveSocket, socketUrl } from "../protocol/live";
 import type { ToBrowser } from "../protocol/messages";
 import { polylineLength } from "../geometry/vectors";
@@ -390,11 +390,4 @@ export class SessionStore {
 /** Whether a reconstruction has not ended yet. */
 export function isBusy(reconstruction: Reconstruction): boolean {
   return reconstruction.state === "queued" || reconstruction.state === "running";
-}
-
-/** An error in words for the person in front of the screen. */
-export function inWords(error: unknown): string {
-  if (error instanceof ApiProblem) return error.message;
-  if (error instanceof TypeError) return "The server does not answer. Is it running?";
-  return error instanceof Error ? error.message : String(error);
 }

@@ -1,7 +1,6 @@
-import type { Api } from "../protocol/api";
+import { type Api, inWords } from "../protocol/api";
 import type { Session } from "../wire.gen";
 import { nameFor, putIn } from "./files";
-import { inWords } from "./session.svelte";
 
 const UNDO_SECONDS = 6;
 

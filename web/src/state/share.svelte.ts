@@ -1,6 +1,5 @@
-import type { Api } from "../protocol/api";
+import { type Api, inWords } from "../protocol/api";
 import type { Token } from "../wire.gen";
-import { inWords } from "./session.svelte";
 
 type Role = Token["role"];
 
