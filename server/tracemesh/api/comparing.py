@@ -40,10 +40,10 @@ class Comparer:
         async with self._turn:
             ear, mouth = Pipe(duplex=False)
             with ear, mouth:
-                doing = self._slot.submit(compare, mesh, truth, align, mouth)
-                async for progress in _watch(doing, ear):
-                    yield progress
                 try:
+                    doing = self._slot.submit(compare, mesh, truth, align, mouth)
+                    async for progress in _watch(doing, ear):
+                        yield progress
                     found: Comparison = await asyncio.wrap_future(doing)
                 except BrokenProcessPool:
                     self._slot.renew()
