@@ -98,14 +98,19 @@ def choose_weights(curves: Sequence[PlacedCurve], samples: NetworkSamples, step:
     """Weights that predict left-out frames best, on as many of the curves as it takes to know them well."""
     few = curves[: max(1, int(np.searchsorted(samples.layout.first, _ENOUGH_ROWS)))]
     part = samples if len(few) == len(curves) else samples.first_curves(len(few))
-    trials = _Trials(DevelopedSpline(part), measured_offsets(few, part), _folds(few, step))
-    weights, covariance = _search(trials, step)
-    return Choice(weights, covariance, smooth_frames(curves, samples, weights))
+    spline, offsets = DevelopedSpline(part), measured_offsets(few, part)
+    weights, covariance = _search(_Trials(spline, offsets, _folds(few, step)), step)
+    if part is not samples:
+        spline, offsets = DevelopedSpline(samples), measured_offsets(curves, samples)
+    return Choice(weights, covariance, _smooth(spline, offsets, weights))
 
 
 def smooth_frames(curves: Sequence[PlacedCurve], samples: NetworkSamples, weights: Weights) -> Floats:
     """Frames (n, 3, 3) of splines through what was measured, at the rows of its samples."""
-    offsets, spline = measured_offsets(curves, samples), DevelopedSpline(samples)
+    return _smooth(DevelopedSpline(samples), measured_offsets(curves, samples), weights)
+
+
+def _smooth(spline: DevelopedSpline, offsets: Offsets, weights: Weights) -> Floats:
     return spline.frames(spline.solve(spline.data_band(offsets, offsets.weight), spline.penalty_band(weights)))
 
 
