@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from alembic.script import ScriptDirectory
-from sqlalchemy import Column, Connection, MetaData, event, select
+from sqlalchemy import Column, Connection, MetaData, event, inspect, select
 
 from tests.conftest import ROOT
 from tracemesh.storage.database import Database, migrations, newest_revision
@@ -86,6 +86,40 @@ def test_every_row_of_an_earlier_schema_is_kept(
             (found,) = connection.execute(select(*kept)).mappings()
             told = {column: v.replace(tzinfo=UTC) if isinstance(v, datetime) else v for column, v in found.items()}
             assert told == {column.name: row[column.name] for column in kept}, name
+
+
+def described(database: Database) -> dict[str, Any]:
+    """All that a schema says of each table, in no order."""
+    with database.engine.connect() as connection:
+        seen, tables = inspect(database.engine), reflected(connection).tables
+    return {
+        name: {
+            "columns": {
+                c.name: (str(c.type), c.nullable, str(c.server_default and c.server_default.arg)) for c in table.columns
+            },
+            "keys": [column.name for column in table.primary_key],
+            "references": {
+                (*key["constrained_columns"], key["referred_table"], *key["options"].items())
+                for key in seen.get_foreign_keys(name)
+            },
+            "unique": {tuple(u["column_names"]) for u in seen.get_unique_constraints(name)},
+            "indexes": {(i["name"], *i["column_names"], bool(i["unique"])) for i in seen.get_indexes(name)},
+            "counts on": bool(table.dialect_options["sqlite"]["autoincrement"]),
+        }
+        for name, table in tables.items()
+    }
+
+
+def test_an_empty_database_gets_the_schema_that_the_migrations_end_with(
+    database_url: str, new_database: Callable[[str], str], databases: Callable[[str], Database]
+) -> None:
+    created = databases(database_url)
+    migrated = databases(new_database(created.engine.dialect.name))
+    migrated.migrate(REVISIONS[-1])
+    for database in (created, migrated):
+        database.migrate()
+        assert database.versions() == (newest_revision(), newest_revision())
+    assert described(created) == described(migrated)
 
 
 def statements(database: Database) -> int:

@@ -1,6 +1,7 @@
 """The database: one engine, short transactions, one schema kept by migrations.
 
-Alembic is imported where it has something to do: most starts find the schema as it should be, and are sooner without.
+Alembic is imported where it has something to do: most starts find the schema as it should be, or none at all, and are
+sooner without.
 """
 
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sqlalchemy import Engine, create_engine, event, inspect
+from sqlalchemy import Column, Engine, MetaData, String, Table, create_engine, event, inspect
 from sqlalchemy.engine import Connection, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import SQLAlchemyError
@@ -17,6 +18,7 @@ from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from tracemesh.errors import ResourceError
+from tracemesh.storage.models import Base
 from tracemesh.storage.postgresql import postgresql_engine
 
 if TYPE_CHECKING:
@@ -70,14 +72,13 @@ class Database:
         present, newest = self.versions()
         if present == (revision or newest):
             return
-        from alembic import command
-
         with self.engine.connect().execution_options(writes=True) as connection, connection.begin():
             if connection.dialect.name == "postgresql":
                 connection.exec_driver_sql("SELECT pg_advisory_xact_lock(7262726564)")
-            config = migrations()
-            config.attributes["connection"] = connection
-            command.upgrade(config, revision or newest)
+            if revision is None and not inspect(connection).get_table_names():
+                _create(connection, newest)
+            else:
+                _upgrade(connection, revision or newest)
 
     def versions(self) -> tuple[str | None, str]:
         """The schema's version, none in an empty database, and the one that this program wants."""
@@ -85,6 +86,22 @@ class Database:
             there = inspect(connection).has_table("alembic_version")
             present = connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalar() if there else None
         return present, newest_revision()
+
+
+def _create(connection: Connection, newest: str) -> None:
+    """The newest schema in an empty database; the migrations end with the same one."""
+    version = Table("alembic_version", MetaData(), Column("version_num", String(32), primary_key=True))
+    for tables in (Base.metadata, version.metadata):
+        tables.create_all(connection, checkfirst=False)
+    connection.execute(version.insert(), {"version_num": newest})
+
+
+def _upgrade(connection: Connection, revision: str) -> None:
+    from alembic import command
+
+    config = migrations()
+    config.attributes["connection"] = connection
+    command.upgrade(config, revision)
 
 
 @contextmanager

@@ -160,7 +160,7 @@ class CurveRow(Base):
     samples: Mapped[int] = mapped_column(Long, default=0)
     length: Mapped[float] = mapped_column(default=0.0)
     odometer: Mapped[float | None]
-    lengths: Mapped[list[dict[str, Any]]] = mapped_column(JSON, default=list)
+    lengths: Mapped[list[dict[str, Any]]] = mapped_column(JSON, default=list, server_default="[]")
 
 
 class MarkRow(Base):
@@ -216,10 +216,10 @@ class ReconstructionRow(Base):
     fraction: Mapped[float] = mapped_column(default=0.0)
     error: Mapped[str | None]
     parameters: Mapped[dict[str, Any]] = mapped_column(JSON)
-    priority: Mapped[int] = mapped_column(default=INTERACTIVE)
+    priority: Mapped[int] = mapped_column(default=INTERACTIVE, server_default="0")
     attempt: Mapped[int] = mapped_column(default=0)
-    losses: Mapped[int] = mapped_column(default=0)
-    beat: Mapped[int] = mapped_column(Long, default=0)
+    losses: Mapped[int] = mapped_column(default=0, server_default="0")
+    beat: Mapped[int] = mapped_column(Long, default=0, server_default="0")
     cancel_requested: Mapped[bool] = mapped_column(default=False)
     created: Mapped[datetime] = mapped_column(UtcTime, default=now)
     finished: Mapped[datetime | None] = mapped_column(UtcTime)
