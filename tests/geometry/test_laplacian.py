@@ -7,7 +7,7 @@ import robust_laplacian
 from tracemesh.geometry.network import Floats, Ints
 from tracemesh.geometry.surfaces.curvature import gaussian_curvature, mean_curvature, normalised, sphere_normals
 from tracemesh.geometry.surfaces.edges import boundary_vertices, interior_edges, unique_edges
-from tracemesh.geometry.surfaces.flattening import flatten
+from tracemesh.geometry.surfaces.flattening import flatten, holes_filled
 from tracemesh.geometry.surfaces.laplacian import cotangent_laplacian, surface_laplacian, triangle_areas
 from tracemesh.geometry.surfaces.quality import mesh_quality
 from tracemesh.geometry.surfaces.triangulation import triangulate_polygon
@@ -191,3 +191,28 @@ def test_normals_from_positions_are_exact_on_any_mesh_of_a_sphere() -> None:
     vertices, faces = icosphere(3)
     uneven = normalised(vertices + 0.03 * np.random.default_rng(2).normal(size=vertices.shape))
     np.testing.assert_allclose(sphere_normals(5 * uneven + 1, faces), uneven, atol=1e-12)
+
+
+@pytest.mark.parametrize("holes", [0, 1, 2])
+def test_filling_holes_makes_disks_again(holes: int) -> None:
+    """Two patches beside each other: every hole closed by one more vertex, outer boundaries left alone."""
+    plane, triangles = disk()
+    first = int(np.flatnonzero((triangles >= 40).all(1))[0])
+    far = int(np.flatnonzero((triangles >= 40).all(1) & ~np.isin(triangles, triangles[first]).any(1))[0])
+    open_ = np.delete(triangles, [first, far][:holes], axis=0)
+    planar = np.vstack([plane, plane + 5])
+    vertices = np.column_stack([planar, planar[:, 0] ** 2])
+    faces, patch = np.vstack([open_, open_ + len(plane)]), np.repeat([0, 1], len(plane))
+
+    filled, closed, places = holes_filled(vertices, faces, planar, patch)
+    assert len(filled) == len(places) == len(vertices) + 2 * holes
+    np.testing.assert_array_equal(filled[: len(vertices)], vertices)
+    np.testing.assert_array_equal(places[: len(planar)], planar)
+    np.testing.assert_array_equal(closed[: len(faces)], faces)
+    edges, beside_edge = unique_edges(closed)
+    assert beside_edge.max() == 2
+    assert len(filled) - len(edges) + len(closed) == 2
+    (ax, ay), (bx, by) = (places[closed[:, k]].T - places[closed[:, 0]].T for k in (1, 2))
+    doubled = ax * by - ay * bx
+    assert (doubled > 0).all()
+    assert doubled.sum() / 2 == pytest.approx(2 * 20 * np.sin(2 * np.pi / 40))

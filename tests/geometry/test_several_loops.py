@@ -151,12 +151,13 @@ def test_flat_plate_with_holes_is_flat_and_covers_its_area(holes: list[tuple[flo
     assert np.cross(b - a, c - a)[:, 2].sum() / 2 == pytest.approx(outer - sum(inner), rel=1e-4)
 
 
-def bent_plate(holes: Sequence[tuple[float, float, float]], along_y: float) -> CurveNetwork:
-    """A plate with holes bent to z = along_y y^2 - x^2: a dome for -1, a saddle for 1."""
+def bent_plate(holes: Sequence[tuple[float, float, float]], along_y: float, bend: float = 1.0) -> CurveNetwork:
+    """A plate with holes bent to z = bend (along_y y^2 - x^2), 1/m: a dome for -1, a saddle for 1."""
     flat = plate(holes)
     x, y, _ = flat.points.T
-    height, slopes = along_y * y**2 - x**2, np.column_stack([2 * x, -2 * along_y * y, np.ones_like(x)])
-    return replace(flat, points=np.column_stack([x, y, height]), normals=radial(slopes))
+    height, slopes = bend * (along_y * y**2 - x**2), bend * np.column_stack([2 * x, -2 * along_y * y])
+    normals = radial(np.column_stack([slopes, np.ones_like(x)]))
+    return replace(flat, points=np.column_stack([x, y, height]), normals=normals)
 
 
 @pytest.mark.parametrize("along_y", [-1.0, 1.0], ids=["dome", "saddle"])
@@ -168,6 +169,16 @@ def bent_plate(holes: Sequence[tuple[float, float, float]], along_y: float) -> C
 def test_holes_in_what_cannot_be_unrolled(holes: list[tuple[float, float, float]], along_y: float) -> None:
     """Steep at the rim, and curved both ways: the sides of a slit that was cut open cross in the plane."""
     sound(bent_plate(holes, along_y), 1 - len(holes), 1 + len(holes))
+
+
+@pytest.mark.parametrize(
+    ("hole", "along_y", "bend"),
+    [((0.3, 0.1, 0.15), -1.0, 1.0), ((0.0, 0.0, 0.3), -1.0, 1.5), ((0.3, 0.1, 0.15), 0.0, 1.5)],
+    ids=["beside the top", "at the top", "in a valley"],
+)
+def test_a_hole_whose_rim_would_turn_inside_out(hole: tuple[float, float, float], along_y: float, bend: float) -> None:
+    """The way from the steep rim to the hole is longer than the rim's radius: unrolled rigidly, the hole has no room."""
+    sound(bent_plate([hole], along_y, bend), 0, 2)
 
 
 def test_plate_with_filled_circles_is_a_disk() -> None:

@@ -9,6 +9,7 @@ normal cannot give where the patch is steep. All patches are unrolled by one fac
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse import csgraph
 
 from tracemesh.geometry.factorisation import Factorisation
 from tracemesh.geometry.network import Floats, Ints
@@ -39,6 +40,40 @@ def flatten(vertices: Floats, faces: Ints, planar: Floats, pinned: Ints) -> Floa
         solved = factor.solve(np.column_stack([right.real, right.imag]))
         position[free] = solved[:, 0] + 1j * solved[:, 1]
     return np.column_stack([position.real, position.imag])
+
+
+def holes_filled(vertices: Floats, faces: Ints, planar: Floats, patch: Ints) -> tuple[Floats, Ints, Floats]:
+    """Vertices, faces and plane positions with a fan of triangles, around one more vertex, in every hole of a patch.
+
+    vertices: (n, 3) m. faces: (f, 3). planar: (n, 2) m. patch: (n,) number of the patch that a vertex belongs to; the
+    longest boundary of a patch is its outer one. Flattened alone, the rim of a hole in a dome turns inside out.
+    """
+    start, end, ring = _boundary_edges(faces, len(vertices))
+    length = np.bincount(ring, np.linalg.norm(vertices[end] - vertices[start], axis=1))
+    longest = np.zeros(int(patch.max()) + 1)
+    np.maximum.at(longest, patch[start], length[ring])
+    inner = length[ring] < longest[patch[start]]
+    start, end = start[inner], end[inner]
+    hole = np.unique(ring[inner], return_inverse=True)[1]
+    fans = np.column_stack([end, start, len(vertices) + hole])
+    centres, places = _means(vertices[start], hole), _means(planar[start], hole)
+    return np.vstack([vertices, centres]), np.vstack([faces, fans]), np.vstack([planar, places])
+
+
+def _boundary_edges(faces: Ints, count: int) -> tuple[Ints, Ints, Ints]:
+    """(e,) start and end of every edge with one face, along it, and the number of the boundary that it is part of."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    alone = ~np.isin(start * count + end, end * count + start)
+    start, end = start[alone], end[alone]
+    joined = sparse.csr_matrix((np.ones(len(start)), (start, end)), (count, count))
+    return start, end, csgraph.connected_components(joined, directed=False)[1][start]
+
+
+def _means(values: Floats, group: Ints) -> Floats:
+    """(groups, d) means of the values (n, d) of every group (n,)."""
+    total = np.zeros((int(group.max(initial=-1)) + 1, values.shape[1]))
+    np.add.at(total, group, values)
+    return np.asarray(total / np.bincount(group)[:, None])
 
 
 def _isometric(corners: Floats) -> Complexes:

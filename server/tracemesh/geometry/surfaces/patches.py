@@ -12,7 +12,7 @@ from tracemesh.geometry.surfaces.bridges import Outline, joined_outline, plain_o
 from tracemesh.geometry.surfaces.cell_complex import CellComplex, segment_name
 from tracemesh.geometry.surfaces.curvature import normalised
 from tracemesh.geometry.surfaces.edges import unique_edges
-from tracemesh.geometry.surfaces.flattening import flatten
+from tracemesh.geometry.surfaces.flattening import flatten, holes_filled
 from tracemesh.geometry.surfaces.planar_maps import (
     SMALLEST_AVERAGE,
     develop,
@@ -170,18 +170,28 @@ def _lift(outline: Outline) -> Floats:
 
 
 def _unrolled_loops(outlines: list[Outline], patches: PatchMesh, vertices: Floats) -> list[tuple[Floats, ...]]:
-    """Boundaries of all patches, unrolled from space into the plane: cut open at slits, and with the slits sewn up.
+    """Boundaries of all patches, unrolled from space into the plane: with their slits sewn up, and cut open at them.
 
-    A band opens as a cylinder does; around a hole in a dome the sides of a slit would cross.
+    A band opens as a cylinder does; around a hole in a dome the sides of a slit would cross, or all but do so.
     """
-    ways = [flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)]
+    open_ = flatten(vertices[patches.vertex], patches.planar_faces, patches.planar, patches.starts)
+    ends = [slice(start, start + len(o.points)) for start, o in zip(patches.starts, outlines, strict=True)]
     patch = np.repeat(np.arange(len(outlines)), np.diff(np.append(patches.starts, len(patches.vertex))))
     _, first, place = np.unique(patch * patches.count + patches.vertex, return_index=True, return_inverse=True)
-    if len(first) < len(patches.vertex):
-        sewn, faces = patches.vertex[first], place[patches.planar_faces]
-        ways.append(flatten(vertices[sewn], faces, patches.planar[first], place[patches.starts])[place])
-    ends = [slice(start, start + len(o.points)) for start, o in zip(patches.starts, outlines, strict=True)]
-    return [tuple(planar[own] for planar in ways) for own in ends]
+    if len(first) == len(patches.vertex):
+        return [(open_[own],) for own in ends]
+    sewn = holes_filled(
+        vertices[patches.vertex[first]], place[patches.planar_faces], patches.planar[first], patch[first]
+    )
+    closed = flatten(*sewn, place[patches.starts])[place]
+    return [_by_stretch(outline, closed[own], open_[own]) for outline, own in zip(outlines, ends, strict=True)]
+
+
+def _by_stretch(outline: Outline, sewn: Floats, cut: Floats) -> tuple[Floats, Floats]:
+    """Two maps (k, 2) of an outline, the better one first; being cut open is worth it where it halves the stretch."""
+    length, least = _edge_lengths(outline.points), np.finfo(float).tiny
+    stretch = [np.linalg.norm(np.log(np.maximum(_edge_lengths(loop) / length, least))) for loop in (sewn, cut)]
+    return (cut, sewn) if stretch[1] < stretch[0] / 2 else (sewn, cut)
 
 
 def _triangulate(
