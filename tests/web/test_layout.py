@@ -19,6 +19,19 @@ FITS = """() => {
   return fits && !document.querySelector(".strip");
 }"""
 """The plot is closed, and the view has taken its place."""
+SEEN_WHOLE = """() => {
+  const view = document.querySelector("main > canvas").getBoundingClientRect();
+  const nodes = [...document.querySelectorAll("circle.node")].map((node) => node.getBoundingClientRect());
+  const [across, down] = [nodes.map(({ x }) => x), nodes.map(({ y }) => y)];
+  const inside = (places, low, high) => Math.min(...places) > low && Math.max(...places) < high;
+  const filled = (places, size) => Math.max(...places) - Math.min(...places) > size / 2;
+  return (
+    inside(across, view.left, view.right) && inside(down, view.top, view.bottom) &&
+    (filled(across, view.width) || filled(down, view.height))
+  );
+}"""
+"""All nodes are in the view, and fill it one way or the other."""
+NODES_DOWN = "() => [...document.querySelectorAll('circle.node')].map((node) => Number(node.getAttribute('cy')))"
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +105,24 @@ def _overlap(a: dict[str, float], b: dict[str, float]) -> bool:
         return min(a[start] + a[size], b[start] + b[size]) - max(a[start], b[start])
 
     return shared("x", "width") > 1 and shared("y", "height") > 1
+
+
+def test_what_was_seen_whole_stays_so_in_a_view_of_another_size(
+    server: Server, page: Page, rider: Callable[[str], Rider]
+) -> None:
+    session = server.call("POST", "/sessions", {"name": "Leaf"})["id"]
+    rider(session).ride(lambda m: False)
+    page.goto(server.page(f"#/sessions/{session}"))
+    expect(page.locator("circle.node")).to_have_count(11)
+    for width, height in ((700, 700), (1600, 500)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_function(SEEN_WHOLE)
+
+    view = page.locator("main > canvas")
+    view.hover(position={"x": 200, "y": 200})
+    page.mouse.wheel(0, -120)  # the camera is in somebody's hands now
+    page.wait_for_timeout(500)
+    before = page.evaluate(NODES_DOWN)
+    page.set_viewport_size({"width": 1300, "height": 500})
+    page.wait_for_timeout(500)
+    assert page.evaluate(NODES_DOWN) == pytest.approx(before, abs=1)

@@ -37,6 +37,8 @@ export class Viewport {
   #box: Box | undefined;
   /** What a moving network was in so far. */
   #swept: Box | undefined;
+  /** Whether everything was brought into sight and nobody took the camera since. */
+  #framed = false;
   #frame = 0;
   #last = 0;
   #fade = 1;
@@ -49,7 +51,7 @@ export class Viewport {
   ) {
     this.#renderer = new WebGLRenderer({ canvas, antialias: true });
     this.#renderer.setPixelRatio(pixelRatio());
-    this.rig = new Rig(canvas, () => events.grabbed(), () => this.invalidate());
+    this.rig = new Rig(canvas, () => this.#grab(), () => this.invalidate());
     this.#curves = new CurvesLayer(palette);
     this.#ground = new Ground(palette.grid);
     this.decorations = new Decorations(palette);
@@ -121,6 +123,7 @@ export class Viewport {
   /** Bring everything into sight; from the n-th named view, or from where the eye is. */
   fit(view?: number): void {
     const named = view === undefined ? undefined : VIEWS[view];
+    this.#framed = true;
     if (this.#box) this.rig.frame(this.#box, named && new Vector3(...named.direction).normalize());
     this.invalidate();
   }
@@ -129,6 +132,7 @@ export class Viewport {
   focusAt(x: number, y: number): void {
     const point = this.pick(x, y);
     if (point) this.rig.focus(new Vector3(...point));
+    this.#framed &&= !point;
     this.invalidate();
   }
 
@@ -228,7 +232,13 @@ export class Viewport {
     if (this.#renderer.getSize(new Vector2()).equals({ x: width, y: height })) return;
     this.#renderer.setSize(width, height, false);
     this.rig.resize(width, height);
+    if (this.#framed) this.fit();
     this.invalidate();
+  }
+
+  #grab(): void {
+    this.#framed = false;
+    this.events.grabbed();
   }
 }
 

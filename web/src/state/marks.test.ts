@@ -88,6 +88,17 @@ it("cuts curves at their marks, closed ones all the way round, and knows what wa
   expect(names({ marks: [], closed: false, lengths, samples: 1 })).toEqual([]);
 });
 
+it("cuts an open curve with one mark into what lies before it and after it", () => {
+  const lengths = [{ first: 50, last: 199, length: 0.3 }];
+  const names = (sample: number): string[] =>
+    segmentsOf({ marks: [{ sample, node: 7 }], closed: false, lengths, samples: 200 }).map(
+      ({ name, first, last, measured }) => `${name} ${first} ${last} ${measured ?? ""}`.trim(),
+    );
+  expect(names(50)).toEqual(["start–7 0 50", "7–end 50 199 0.3"]);
+  expect(names(0)).toEqual(["7–end 0 199"]);
+  expect(names(199)).toEqual(["start–7 0 199"]);
+});
+
 it("sets and takes away one measured length", () => {
   const [segment] = segmentsOf({ marks, closed: false, lengths: [], samples: 200 });
   if (!segment) throw new Error("there is a segment");

@@ -51,7 +51,8 @@ export function marksChanged(marks: readonly Mark[], { sample, node }: Mark, to:
   return changed.sort((a, b) => a.sample - b.sample);
 }
 
-/** A stretch of a curve between two neighbouring marks; a curve without marks is one. */
+/** A stretch of a curve between two neighbouring marks; a curve without marks is one, and the ends of an open curve with
+ * one mark are two. */
 export interface Segment {
   /** What people call it: the nodes at its ends. */
   readonly name: string;
@@ -65,11 +66,18 @@ export interface Segment {
 /** The segments of a curve in its order; a closed one returns to its first mark. */
 export function segmentsOf(curve: Pick<Curve, "marks" | "closed" | "lengths" | "samples">): Segment[] {
   const ends = segmentEnds(curve);
-  if (!ends.length) return curve.samples > 1 ? [segment(curve, "whole curve", 0, curve.samples - 1)] : [];
+  const final = curve.samples - 1;
+  if (!ends.length) return final > 0 ? [segment(curve, "whole curve", 0, final)] : [];
+  if (ends.length === 1) return looseEnds(curve, ends[0] as Mark, final);
   return ends.slice(1).map((last, i) => {
     const first = ends[i] as Mark;
     return segment(curve, `${first.node}–${last.node}`, first.sample, last.sample);
   });
+}
+
+function looseEnds(curve: Pick<Curve, "lengths">, { sample, node }: Mark, final: number): Segment[] {
+  const before = sample > 0 ? [segment(curve, `start–${node}`, 0, sample)] : [];
+  return sample < final ? [...before, segment(curve, `${node}–end`, sample, final)] : before;
 }
 
 function segmentEnds({ marks, closed }: Pick<Curve, "marks" | "closed">): readonly Mark[] {
