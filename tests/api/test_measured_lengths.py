@@ -25,10 +25,17 @@ def curve(server: Any, session: str, index: int) -> dict[str, Any]:
 
 def drawn(server: Any, session: str, index: int) -> list[float]:
     """Lengths, m, of a curve's segments as the preview draws them."""
+    return drawn_between(
+        server, session, index, [mark["sample"] for mark in curve(server, session, index)["marks"][:-1]]
+    )
+
+
+def drawn_between(server: Any, session: str, index: int, samples: list[int]) -> list[float]:
+    """Lengths, m, from each of these samples of a curve to the next one, and from the last to its end."""
     preview = Preview.model_validate(server.http.post(f"/sessions/{session}/preview").json())
     line = preview.curves[index]
     steps = np.linalg.norm(np.diff(np.reshape(line.positions, (-1, 3)), axis=0), axis=1)
-    places = [line.samples.index(mark["sample"]) for mark in curve(server, session, index)["marks"][:-1]]
+    places = [line.samples.index(sample) for sample in samples]
     return [float(steps[a:b].sum()) for a, b in pairwise([*places, len(steps)])]
 
 
@@ -59,6 +66,18 @@ def test_a_curve_without_marks_is_measured_as_a_whole(server: Any, session: str,
     preview = Preview.model_validate(server.http.post(f"/sessions/{session}/preview").json())
     steps = np.diff(np.reshape(preview.curves[0].positions, (-1, 3)), axis=0)
     assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(3.0, rel=0.1)
+
+
+def test_a_branch_is_measured_on_both_sides_of_its_only_mark(server: Any, session: str) -> None:
+    known = curve(server, session, 1)
+    middle = known["marks"][1]
+    change = {"marks": [middle]}
+    server.http.patch(f"/sessions/{session}/curves/1", json=change).raise_for_status()
+    before, after = drawn_between(server, session, 1, [0, middle["sample"]])
+    last = known["samples"] - 1
+    give(server, session, 1, (0, middle["sample"], 0.7 * before), (middle["sample"], last, 1.3 * after))
+    lengths = drawn_between(server, session, 1, [0, middle["sample"]])
+    assert lengths == pytest.approx([0.7 * before, 1.3 * after], rel=0.02)
 
 
 def test_it_goes_with_a_mark_that_moves_and_sleeps_while_another_is_between(server: Any, session: str) -> None:

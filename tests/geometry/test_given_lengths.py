@@ -68,6 +68,24 @@ def test_a_given_length_corrects_a_wheel_too(measured: Scan) -> None:
     np.testing.assert_allclose(mended.points, reconstruct_network(measured, PARAMETERS).network.points, atol=1e-9)
 
 
+@pytest.mark.parametrize(("place", "kept"), [(0.0, (1,)), (0.3, (0, 1)), (1.0, (0,))], ids=["begin", "middle", "end"])
+def test_the_only_node_of_an_open_curve_parts_it_in_two(measured: Scan, place: float, kept: tuple[int, ...]) -> None:
+    """A branch that hangs on one node: what lies before it and after it has a length of its own."""
+    first = measured.curves[0]
+    sample = round(place * (len(first.distance) - 1))
+    branch = replace(first, node_samples=np.array([sample]), node_ids=first.node_ids[:1], closed=False)
+    scan = Scan((branch, *measured.curves[1:]))
+    given = give_lengths(scan, {(0, k): (0.2, 0.5)[k] for k in kept})
+    network = reconstruct_network(given, PARAMETERS).network
+    own = [s for s in network.segments if s.curve == 0]
+    along = [float(np.linalg.norm(np.diff(network.points[s.points], axis=0), axis=1).sum()) for s in own]
+    assert along == pytest.approx([(0.2, 0.5)[k] for k in kept], rel=0.02)
+    for missing in {0, 1} - set(kept):
+        words = f"for what lies {('before', 'after')[missing]} the only node of curve 1, but nothing does"
+        with pytest.raises(ScanError, match=words):
+            reconstruct_network(give_lengths(scan, {(0, missing): 0.1}), PARAMETERS)
+
+
 @pytest.mark.parametrize(
     ("place", "length", "words"),
     [

@@ -177,7 +177,7 @@ def test_holes_in_what_cannot_be_unrolled(holes: list[tuple[float, float, float]
     ids=["beside the top", "at the top", "in a valley"],
 )
 def test_a_hole_whose_rim_would_turn_inside_out(hole: tuple[float, float, float], along_y: float, bend: float) -> None:
-    """The way from the steep rim to the hole is longer than the rim's radius: unrolled rigidly, the hole has no room."""
+    """The way from the steep rim to the hole is longer than the rim's radius: unrolled, the hole has no room."""
     sound(bent_plate([hole], along_y, bend), 0, 2)
 
 

@@ -27,7 +27,8 @@ class CurveScan:
     acceleration, magnetic: (n, 3) or None, the raw vectors in the device's frame, any unit; used to judge quality.
     time: (n,) s or None, device clock.
     timed: the distance was made from durations; between two nodes it is right up to a factor that is not known.
-    lengths: (s,) m or None, of the segments between its nodes, in order, where somebody measured them; NaN elsewhere.
+    lengths: (s,) m or None, of its segments, in order, where somebody measured them; NaN elsewhere. Segments lie
+    between its nodes; a curve without nodes is one, and the only node of an open curve parts it in two.
     calibration: what people call the calibration with which it was made of a device's readings; empty: none.
     """
 

@@ -50,7 +50,7 @@ def load_sent(transaction: Transaction, session: str) -> tuple[Scan, list[int]]:
 def with_measured(curve: CurveScan, measured: Mapping[tuple[int, int], float]) -> CurveScan:
     """A curve as sent with those lengths (m, by first and last sample) that are between two neighbouring marks.
 
-    A curve without marks is measured from its first sample to its last.
+    A curve without marks is measured from its first sample to its last, an open one with one mark on both sides of it.
     """
     lengths = np.array([measured.get(pair, np.nan) for pair in pairwise(_segment_ends(curve))])
     return curve if np.isnan(lengths).all() else replace(curve, lengths=lengths)
@@ -58,8 +58,8 @@ def with_measured(curve: CurveScan, measured: Mapping[tuple[int, int], float]) -
 
 def _segment_ends(curve: CurveScan) -> list[int]:
     samples: list[int] = curve.node_samples.tolist()
-    if not samples:
-        return [0, len(curve.distance) - 1]
+    if not samples or (len(samples) == 1 and not curve.closed):
+        return [0, *samples, len(curve.distance) - 1]
     returns = len(samples) > 1 and curve.node_ids[0] == curve.node_ids[-1]
     return samples + samples[:1] if curve.closed and not returns else samples
 

@@ -46,21 +46,36 @@ class PlacedCurve:
         return float(self.marks[-1])
 
 
-def _with_ends(curve: CleanCurve) -> tuple[Floats, Ints]:
-    """Marks and nodes of an open curve; its unmarked ends are among them where too few nodes were marked."""
+def _with_ends(curve: CleanCurve) -> CleanCurve:
+    """An open curve with its unmarked ends among its marks, where too few nodes were marked."""
     marks, nodes = curve.marks, curve.nodes
     if len(marks) >= 2:
-        return marks, nodes
+        return curve
     low, high = curve.distance[0], curve.distance[-1]
     least = _SHORTEST_END * (high - low)
     before, after = not len(marks) or low + least < marks[0], not len(marks) or high - least > marks[-1]
     marks = np.concatenate([[low] * int(before), marks, [high] * int(after)])
-    return marks, np.concatenate([[_LOOSE] * int(before), nodes, [_LOOSE] * int(after)]).astype(np.int64)
+    nodes = np.concatenate([[_LOOSE] * int(before), nodes, [_LOOSE] * int(after)]).astype(np.int64)
+    lengths = _beside_only_node(curve, before, after) if len(curve.marks) else curve.lengths
+    return replace(curve, marks=marks, nodes=nodes, lengths=lengths)
+
+
+def _beside_only_node(curve: CleanCurve, before: bool, after: bool) -> Floats | None:
+    """Lengths given for what lies before and after the only node of a curve, of those that there are."""
+    if curve.lengths is None or len(curve.lengths) != 2:
+        return curve.lengths
+    for there, length, where in ((before, curve.lengths[0], "before"), (after, curve.lengths[1], "after")):
+        if not there and not np.isnan(length):
+            raise ScanError(
+                f"a length of {length:g} m is given for what lies {where} the only node of {curve_name(curve.index)}, "
+                "but nothing does"
+            )
+    return curve.lengths[[before, after]]
 
 
 def _place_open(curve: CleanCurve) -> PlacedCurve:
-    marks, nodes = _with_ends(curve)
-    return _cut(curve, curve.distance, curve.quaternion, curve.tangent, marks, nodes)
+    curve = _with_ends(curve)
+    return _cut(curve, curve.distance, curve.quaternion, curve.tangent, curve.marks, curve.nodes)
 
 
 def _place_closed(curve: CleanCurve) -> PlacedCurve:

@@ -131,4 +131,5 @@ def _given(index: int, curve: CurveScan, lengths: Mapping[tuple[int, int], float
 
 
 def _segments(curve: CurveScan) -> int:
-    return max(len(curve.node_ids) - 1, 1)
+    count = len(curve.node_ids)
+    return 2 if count == 1 and not curve.closed else max(count - 1, 1)

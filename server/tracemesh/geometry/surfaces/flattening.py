@@ -66,7 +66,8 @@ def _boundary_edges(faces: Ints, count: int) -> tuple[Ints, Ints, Ints]:
     alone = ~np.isin(start * count + end, end * count + start)
     start, end = start[alone], end[alone]
     joined = sparse.csr_matrix((np.ones(len(start)), (start, end)), (count, count))
-    return start, end, csgraph.connected_components(joined, directed=False)[1][start]
+    labels = csgraph.connected_components(joined, directed=False)[1].astype(np.int64)
+    return start, end, labels[start]
 
 
 def _means(values: Floats, group: Ints) -> Floats:
