@@ -58,7 +58,7 @@ class Problem:
     @classmethod
     def of(cls, known: KnownScan) -> "Problem":
         curves = tuple(place_curve(curve) for curve in clean_curves(known.scan.curves))
-        step = NetworkParameters().step_fraction * measure_network(curves, measured_layout(curves)).diagonal
+        step = NetworkParameters().step_fraction * measure_network(curves, measured_layout(curves)).extent
         samples = resample(curves, uniform_layout(curves, step), step)
         choice = choose_weights(curves, samples, step)
         closed = close_network(curves, samples, choice, step, PREFILTER * step, "auto")

@@ -40,7 +40,7 @@ NETWORK_SHARE = 0.3
 LEAST_CONFIDENCE = 0.5
 """A node that was found rather than marked is used where it is likelier than not."""
 MOST_DIVISIONS = 3000
-"""Vertices along a network's diagonal: more would make a mesh of many million."""
+"""Vertices along a network's extent: more would make a mesh of many million."""
 SOFT_LENGTH = 2.0
 """Edge lengths over which a soft surface smooths its network."""
 FLATTEST = 1e-3
@@ -169,7 +169,7 @@ def _array_step(array: SensorArray, rotations: Floats, parameters: Reconstructio
         return wanted.step
     coarse = ArraySolver(array, float(max(curve.spacing.max() for curve in array.curves)))
     length = sum(float(curve.spacing.sum()) for curve in array.curves)
-    return wanted.step_fraction * max(coarse.solve(rotations).network.diagonal, FLATTEST * length)
+    return wanted.step_fraction * max(coarse.solve(rotations).network.extent, FLATTEST * length)
 
 
 def _array_report(array: SensorArray, solved: ArrayNetwork, step: float, weights: Weights | None) -> dict[str, object]:
@@ -313,15 +313,14 @@ def _mesh_size(parameters: ReconstructionParameters, network: CurveNetwork) -> f
     if parameters.mesh_size is None:
         return None
     number, relative = _number(parameters.mesh_size)
-    diagonal = float(np.linalg.norm(np.ptp(network.points, axis=0)))
-    size = number / 100 * diagonal if relative else number
-    if not size * MOST_DIVISIONS >= diagonal:
-        raise ScanError(f"wanted a mesh size of at least {diagonal / MOST_DIVISIONS:.3g} m, got {size:.3g} m")
+    size = number / 100 * network.extent if relative else number
+    if not size * MOST_DIVISIONS >= network.extent:
+        raise ScanError(f"wanted a mesh size of at least {network.extent / MOST_DIVISIONS:.3g} m, got {size:.3g} m")
     return size
 
 
 def _number(text: str) -> tuple[float, bool]:
-    """A length and whether it is in % of a diagonal rather than in m."""
+    """A length and whether it is in % of the extent rather than in m."""
     return float(text.rstrip("%")), text.endswith("%")
 
 

@@ -12,14 +12,14 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tracemesh.geometry.curves.reconstruction import NetworkParameters, reconstruct_network
-from tracemesh.geometry.network import CurveNetwork
+from tracemesh.geometry.network import CurveNetwork, extent_of
 from tracemesh.geometry.rotations import exp
 from tracemesh.geometry.scan import CurveScan, Scan
 from tracemesh.geometry.simulated.shapes import SHAPES
 from tracemesh.geometry.simulated.simulation import exact_scan
 
 FIXED = NetworkParameters(step=0.012, stretch=0.0, bend=0.02, curve_bias="off")
-AUTOMATIC, WITH_STEP = NetworkParameters(), NetworkParameters(step=0.012)
+AUTOMATIC = NetworkParameters()
 either_way = pytest.mark.parametrize("parameters", [FIXED, AUTOMATIC], ids=["fixed", "automatic"])
 
 
@@ -33,9 +33,8 @@ def noisy(faulty_scan: Callable, name: str = "leaf") -> Scan:
     return faulty_scan(name, 0.003, seed=7, noise=0.02, heading=0.02, mark=0.001).scan
 
 
-@pytest.mark.parametrize("parameters", [FIXED, WITH_STEP], ids=["fixed", "automatic"])
+@either_way
 def test_axes_of_the_world(faulty_scan: Callable, parameters: NetworkParameters) -> None:
-    """The step is given: the diagonal that it is a share of else is that of a box along the world's axes."""
     scan, turn = noisy(faulty_scan), exp(np.array([2.0, 1.0, -0.5]))
     turned = Scan(tuple(replace(c, tangent=c.tangent @ turn.T, normal=c.normal @ turn.T) for c in scan.curves))
     first, second = (reconstruct_network(s, parameters).network for s in (scan, turned))
@@ -126,3 +125,30 @@ def test_start_of_a_closed_curve(mark: int, parameters: NetworkParameters) -> No
     nearest = cKDTree(first.points).query(second.points)[1]
     assert len(first.points) == len(second.points) == len(np.unique(nearest))
     assert_same(second.points, first.points[nearest], first, parameters)
+
+
+@pytest.mark.parametrize("way", ["leaf", "sphere", "torus", "cone", "egg"])
+def test_extent_is_near_the_bounding_box_whatever_the_axes(way: str) -> None:
+    network = SHAPES[way]().network(0.01)
+    turned = replace(network, points=network.points @ exp(np.array([0.3, -1.2, 2.0])).T + 5.0)
+    assert turned.extent == pytest.approx(network.extent, rel=1e-12)
+    assert network.extent == pytest.approx(network.diagonal, rel=0.2)
+
+
+def test_extent_of_a_straight_line_is_its_length_however_it_is_cut() -> None:
+    direction = np.array([1.0, -2.0, 0.5])
+    for cuts in ([0.0, 1.0], [0.0, 0.1, 0.35, 1.0]):
+        at = np.array(cuts)[:, None] * direction
+        assert extent_of(at[:-1], at[1:]) == pytest.approx(np.linalg.norm(direction))
+
+
+def test_extent_of_a_point_is_nothing() -> None:
+    assert extent_of(np.ones((3, 3)), np.ones((3, 3))) == 0.0
+
+
+def test_extent_of_an_evenly_filled_box_is_its_diagonal() -> None:
+    """Parallel lines through it, closer and closer: exact up to the square of their distance."""
+    lines = (np.arange(50) + 0.5) / 50
+    y, z = (grid.ravel() for grid in np.meshgrid(2 * lines, 3 * lines))
+    starts = np.column_stack([0 * y, y, z])
+    assert extent_of(starts, starts + np.array([4.0, 0.0, 0.0])) == pytest.approx(np.sqrt(4 + 9 + 16), rel=1e-3)

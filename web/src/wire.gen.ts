@@ -670,7 +670,7 @@ export interface ReconstructionParameters {
    */
   infer_nodes: boolean;
   /**
-   * distance of the surface's vertices: % of the network's diagonal, or m; none: as its points
+   * distance of the surface's vertices: % of the estimated diagonal, or m; none: as its points
    */
   mesh_size: string | null;
   /**
@@ -889,7 +889,7 @@ export interface PreviewWish {
    */
   marks: CurveMarks[];
   /**
-   * distance of the surface's vertices: % of the network's diagonal, or m; none: as its points
+   * distance of the surface's vertices: % of the estimated diagonal, or m; none: as its points
    */
   mesh_size: string | null;
   /**

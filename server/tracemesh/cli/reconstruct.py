@@ -109,7 +109,7 @@ def _add_mesh_size(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mesh-size",
         type=mesh_size,
-        help="distance of the surface's vertices: %% of the network's diagonal, or m (default: as its points)",
+        help="distance of the surface's vertices: %% of the estimated diagonal, or m (default: as its points)",
     )
 
 

@@ -204,7 +204,7 @@ class ReconstructionParameters(Message):
     mesh_size: str | None = Field(
         default=None,
         pattern=PERCENT_OR_METRES,
-        description="distance of the surface's vertices: % of the network's diagonal, or m; none: as its points",
+        description="distance of the surface's vertices: % of the estimated diagonal, or m; none: as its points",
     )
     prefilter: float | None = Field(
         default=None,

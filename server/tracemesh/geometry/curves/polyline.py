@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tracemesh.geometry.curves.placement import PlacedCurve
 from tracemesh.geometry.curves.positions import Positions, solve_positions
 from tracemesh.geometry.curves.samples import Layout
+from tracemesh.geometry.network import extent_of
 from tracemesh.geometry.rotations import normalized
 
 Floats = NDArray[np.float64]
@@ -35,9 +36,10 @@ class MeasuredNetwork:
     smooth_residual: float
 
     @property
-    def diagonal(self) -> float:
-        """Length of the bounding box's diagonal, m."""
-        return float(np.linalg.norm(np.ptp(self.positions.points, axis=0)))
+    def extent(self) -> float:
+        """Estimated diagonal, m, whatever the world's axes: see `extent_of`."""
+        rows = self.layout.edges
+        return extent_of(self.positions.points[rows], self.positions.points[rows + 1])
 
     def displacement(self, curve: int) -> float:
         """How far from its start a curve ends, m, before the network pulls it together."""

@@ -31,14 +31,14 @@ Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 
 _STAGES = ("measuring", "resampling", "weighing", "closing", "smoothing", "positions", "uncertainty")
-_FLATTEST = 1e-3  # diagonal over length of the curves that a step is still derived from
+_FLATTEST = 1e-3  # extent over length of the curves that a step is still derived from
 _MOST_SAMPLES = 5_000_000
 _WIDEST = 25.0  # steps that a pre-filter may be wide: each sample sees a bounded number of measured ones
 
 
 @dataclass(frozen=True)
 class NetworkParameters:
-    """step: m between samples; None: step_fraction of the diagonal estimated from the scan. stretch, bend: smoothing
+    """step: m between samples; None: step_fraction of the extent estimated from the scan. stretch, bend: smoothing
     lengths, m; None: automatic, or 0 if only the other is given. weights: automatic ones by cross-validation, or the
     thesis's lambda = mu = 1 in metres. curve_bias: estimate a rotation and a scale per curve and how far its nodes are
     from their marks: where the data speak for it, always, or never.
@@ -197,6 +197,7 @@ class NetworkReconstruction:
                 "segments": len(network.segments),
                 "length_m": float(layout.lengths.sum()),
                 "diagonal_m": network.diagonal,
+                "extent_m": self.measured.network.extent,
             },
             "frame_noise_deg": float(np.rad2deg(self._choice.noise)),
             "curve_bias": bias_report(self._closed.found if self._closed else None, self.measured.indices),
@@ -219,7 +220,7 @@ def _check_parameters(parameters: NetworkParameters) -> None:
 
 def _step(parameters: NetworkParameters, measured: MeasuredScan) -> float:
     length = sum(curve.length for curve in measured.curves)
-    step = parameters.step_fraction * max(measured.network.diagonal, _FLATTEST * length)
+    step = parameters.step_fraction * max(measured.network.extent, _FLATTEST * length)
     step = step if parameters.step is None else parameters.step
     if step > length:
         raise ScanError(f"a step of {step:.3g} m is longer than all curves together, {length:.3g} m")
