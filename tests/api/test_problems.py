@@ -1,6 +1,8 @@
 """Problems say where they are, and the edits that they propose mend them."""
 
 import itertools
+import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +94,21 @@ def test_people_are_told_their_own_numbers(server: Any, session: str) -> None:
     numbers = [mark["node"] for mark in marks(server, session, 1)]
     wanted = [f"segment {a}-{b} of curve 2 is marked as boundary" for a, b in itertools.pairwise(numbers)]
     assert [w in p.message for w, p in zip(wanted, problems(server, session), strict=True)] == [True, True]
+
+
+def test_whatever_fails_names_the_curves_as_the_page_does(server: Any, session: str) -> None:
+    """Curve 1 is gone and curve 3 hangs on nothing: problems, a preview, found nodes and a job say so of curve 3."""
+    edit(server, session, 0, removed=True)
+    edit(server, session, 2, marks=[mark | {"node": 100 + i} for i, mark in enumerate(marks(server, session, 2))])
+    said = [p.message for p in problems(server, session) if p.severity == "error"]
+    said.append(server.http.post(f"/sessions/{session}/preview").json()["detail"])
+    job = server.http.post(f"/sessions/{session}/reconstructions", json={}).json()
+    while (found := server.http.get(f"/reconstructions/{job['id']}").json())["state"] in ("queued", "running"):
+        time.sleep(0.05)
+    said.append(found["error"])
+    named = [re.findall(r"curve (\d+)", message) for message in said]
+    assert len(said) == 3
+    assert all("3" in numbers and "1" not in numbers for numbers in named), said
 
 
 def test_what_fits_badly_is_shown_where_it_is(server: Any, session: str) -> None:

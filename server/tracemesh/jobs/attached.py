@@ -13,6 +13,7 @@ from tracemesh.errors import ScanError
 from tracemesh.geometry.curves.closed_curves import as_scanned, begun_at_nodes
 from tracemesh.geometry.network import CurveNetwork
 from tracemesh.geometry.scan import CurveScan, Floats, Ints, Scan
+from tracemesh.jobs.numbering import numbered
 from tracemesh.storage.curves import curve_rows
 from tracemesh.storage.database import Database
 from tracemesh.storage.scans import load_sent
@@ -78,7 +79,8 @@ def solve_network(scan: Scan, indices: Sequence[int]) -> SolvedNetwork:
     from tracemesh.geometry.curves.reconstruction import reconstruct_network
 
     begun = begun_at_nodes(scan)
-    return solved_network(scan, begun, indices, reconstruct_network(begun))
+    with numbered(indices):
+        return solved_network(scan, begun, indices, reconstruct_network(begun))
 
 
 def solved_network(scan: Scan, begun: Scan, indices: Sequence[int], result: "NetworkResult") -> SolvedNetwork:

@@ -9,6 +9,7 @@ import numpy as np
 from tracemesh.errors import ScanError
 from tracemesh.geometry.scan import Floats, Scan, curve_name
 from tracemesh.jobs.attached import SolvedNetwork, solve_network
+from tracemesh.jobs.numbering import renumbered
 from tracemesh.wire.resources import Curve, CurveEdit, CurveUpdate, Fix, Mark, NetworkProblem
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ class _Finder:
             first, last = self._samples(fault.segment)
             ends = {None: (first, last), 0: (first, first), -1: (last, last)}[fault.end]
             fix = self._fix(fault, faults, curve, ends[0])
-            message = self._renamed(fault)
+            message = renumbered(fault.message, [c.index for c in self._curves])
             yield NetworkProblem(message=message, severity="error", curves=[curve.index], samples=ends, fix=fix)
 
     def warnings(self) -> Iterator[NetworkProblem]:
@@ -129,14 +130,6 @@ class _Finder:
         before = sum(len(self._network.segments[i].points) - 1 for i in own if i < segment)
         samples = self._solved.curves[self._curves[curve].index].samples
         return int(samples[before]), int(samples[before + len(self._network.segments[segment].points) - 1])
-
-    def _renamed(self, fault: "Fault") -> str:
-        """The message with the numbers that people gave their curves."""
-        from tracemesh.geometry.surfaces.cell_complex import segment_name
-
-        index = self._curve(fault.segment).index
-        name, wanted = (segment_name(self._network, fault.segment, curve) for curve in (None, index))
-        return fault.message.replace(name, wanted)
 
 
 def _marked(curve: Curve, marks: set[tuple[int, int]]) -> CurveEdit:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from tracemesh.geometry.curves.closed_curves import sample_as_scanned
 from tracemesh.geometry.scan import CurveScan, Scan
+from tracemesh.jobs.numbering import numbered
 from tracemesh.wire.resources import Curve, NodePlace, NodeProposal, NodeProposals
 
 
@@ -11,7 +12,8 @@ def propose_nodes(scan: Scan, curves: Sequence[Curve]) -> NodeProposals:
     """Nodes of a scan whose curves are these ones of a session; raises ScanError."""
     from tracemesh.geometry.nodes.node_inference import infer_nodes  # here, so that the server itself stays small
 
-    found = infer_nodes(scan)
+    with numbered([curve.index for curve in curves]):
+        found = infer_nodes(scan)
     proposals = [
         NodeProposal(
             places=[

@@ -15,6 +15,7 @@ from tracemesh.geometry.curves.measured_scan import MeasuredScan
 from tracemesh.geometry.curves.reconstruction import NetworkParameters, NetworkReconstruction, wanted_weights
 from tracemesh.geometry.scan import Scan
 from tracemesh.jobs.attached import SolvedNetwork, solved_network
+from tracemesh.jobs.numbering import numbered
 from tracemesh.pipeline import network_parameters
 from tracemesh.wire.resources import ReconstructionParameters
 
@@ -33,7 +34,8 @@ def solve_warm(
     chosen = network_parameters(parameters)
     made_ready = replace(chosen, stretch=None, bend=None, weights="auto")
     begun = begun_at_nodes(scan)
-    result = _kept().get((loaded, made_ready), begun, budget).solve(wanted_weights(chosen))
+    with numbered(indices):
+        result = _kept().get((loaded, made_ready), begun, budget).solve(wanted_weights(chosen))
     return solved_network(scan, begun, indices, result)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tracemesh.errors import Cancelled, TracemeshError, Unavailable
 from tracemesh.formats.networks import read_network
+from tracemesh.jobs.numbering import numbered
 from tracemesh.storage.artifacts import ArtifactStore, artifact_row
 from tracemesh.storage.database import Database
 from tracemesh.storage.readings import StoredReading, is_of_array, load_reading
@@ -80,10 +81,12 @@ class _Attempt:
         session, number = wanted.session, wanted.parameters.reading
         with self._database.read() as transaction:
             of_array = is_of_array(transaction, session, number)
-            measured = load_reading(transaction, session, number) if of_array else load_scan(transaction, session)[0]
-        if isinstance(measured, StoredReading):
-            return self._from_reading(wanted, measured)
-        return reconstruct(measured, wanted.parameters, self._progress)
+            stored = load_reading(transaction, session, number) if of_array else load_scan(transaction, session)
+        if isinstance(stored, StoredReading):
+            return self._from_reading(wanted, stored)
+        scan, indices = stored
+        with numbered(indices):
+            return reconstruct(scan, wanted.parameters, self._progress)
 
     def _from_reading(self, wanted: Reconstruction, stored: StoredReading) -> "Result":
         from tracemesh.formats.readings import sensor_array, sensor_rotations

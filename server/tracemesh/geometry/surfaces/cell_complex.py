@@ -111,10 +111,10 @@ def _refuse(faults: list[Fault]) -> None:
         raise NetworkError(faults[0].message)
 
 
-def segment_name(network: CurveNetwork, index: int, curve: int | None = None) -> str:
-    """A segment as a person finds it: the numbers of its end nodes and of its curve, if that is not the network's."""
+def segment_name(network: CurveNetwork, index: int) -> str:
+    """A segment as a person finds it: the numbers of its end nodes and of its curve."""
     segment, called = network.segments[index], network.node_numbers
-    name = curve_name(segment.curve if curve is None else curve)
+    name = curve_name(segment.curve)
     numbers = dict(zip(network.nodes.tolist(), range(len(network.nodes)) if called is None else called, strict=True))
     if segment.points[0] == segment.points[-1] and int(segment.points[0]) not in numbers:
         return f"closed {name}"
