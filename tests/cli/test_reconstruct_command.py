@@ -13,6 +13,7 @@ import pytest
 import trimesh
 
 from tracemesh.cli import main
+from tracemesh.formats.meshes import write_triangles
 
 
 def tracemesh(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -96,6 +97,25 @@ def without_unused_points(network: dict[str, Any]) -> dict[str, Any]:
         segment["points"] = [number[p] for p in segment["points"]]
     kept = {name: [network[name][p] for p in used] for name in ("points", "normals")}
     return {**network, **kept, "nodes": [number[p] for p in network["nodes"]]}
+
+
+@pytest.mark.parametrize("align", ["none", "rigid"])
+def test_looking_both_ways_sees_what_is_missing(lilium: Path, tmp_path: Path, align: str) -> None:
+    """A square and its left half, cut off at x = .5: no vertex of the half is off, and (1, y) is .5 from it."""
+    side = np.linspace(0, 1, 11)
+    vertices = np.column_stack([*(axis.ravel() for axis in np.meshgrid(side, side)), np.zeros(121)])
+    grid = np.arange(121).reshape(11, 11)
+    a, b, c, d = (corner.ravel() for corner in (grid[:-1, :-1], grid[:-1, 1:], grid[1:, :-1], grid[1:, 1:]))
+    faces = np.vstack([np.column_stack([a, b, d]), np.column_stack([a, d, c])])
+    left = faces[(vertices[faces][:, :, 0] < 0.51).all(1)]
+    for name, part in (("whole.obj", faces), ("half.obj", left)):
+        (tmp_path / name).write_bytes(write_triangles(vertices, part, "obj"))
+    options = ("--truth", tmp_path / "whole.obj", "--align", align, "--both-ways")
+    found = json.loads(tracemesh("evaluate", tmp_path / "half.obj", *options, "--json").stdout)
+    assert (found["max"], found["hausdorff"]) == pytest.approx((0.0, 50 / np.sqrt(2)), abs=1e-6)
+    assert "35.3553 % (Hausdorff distance)" in tracemesh("evaluate", tmp_path / "half.obj", *options).stdout
+    refused = tracemesh("evaluate", lilium / "network.json", *options)
+    assert (refused.returncode, "wanted a mesh" in refused.stderr) == (1, True)
 
 
 def test_an_uneven_network_is_resampled_first(lilium: Path, tmp_path: Path) -> None:

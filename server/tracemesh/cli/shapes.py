@@ -2,10 +2,17 @@
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tracemesh.cli.arguments import Commands, noise, seed
+from tracemesh.errors import InputError
 from tracemesh.files import check_writable, read_bytes, read_text, write_all
+
+if TYPE_CHECKING:
+    from tracemesh.geometry.comparison.evaluation import Evaluation
+    from tracemesh.geometry.network import Floats, Ints
 
 
 def add_evaluate(commands: Commands) -> None:
@@ -22,6 +29,11 @@ def add_evaluate(commands: Commands) -> None:
         choices=("none", "rigid", "similarity"),
         default="none",
         help="register first: rotation and translation (rigid), also scale (similarity)",
+    )
+    parser.add_argument(
+        "--both-ways",
+        action="store_true",
+        help="of a mesh: also from the truth to it; prints the Hausdorff distance, large where a part is missing",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.set_defaults(command=_evaluate)
@@ -51,19 +63,38 @@ def add_simulate(commands: Commands) -> None:
 
 
 def _evaluate(chosen: argparse.Namespace) -> int:
-    from tracemesh.formats.meshes import read_mesh
     from tracemesh.formats.networks import read_network
-    from tracemesh.geometry.comparison.evaluation import evaluate, vertex_normals
+    from tracemesh.geometry.comparison.evaluation import evaluate
 
-    truth = read_mesh(read_bytes(chosen.truth), Path(chosen.truth).suffix.lstrip("."), chosen.truth)
-    if Path(chosen.input).suffix == ".json":
+    truth = _mesh(chosen.truth)
+    if Path(chosen.input).suffix != ".json":
+        measured = _evaluated_mesh(_mesh(chosen.input), truth, chosen)
+    elif chosen.both_ways:
+        raise InputError(f"{chosen.input}: wanted a mesh to look at both ways, got a network: it has no surface")
+    else:
         network = read_network(read_text(chosen.input), chosen.input)
         measured = evaluate(network.points, network.normals, *truth, align=chosen.align)
-    else:
-        vertices, faces = read_mesh(read_bytes(chosen.input), Path(chosen.input).suffix.lstrip("."), chosen.input)
-        measured = evaluate(vertices, vertex_normals(vertices, faces), *truth, align=chosen.align)
     print(json.dumps(measured.summary()) if chosen.json else measured.text())
     return 0
+
+
+def _mesh(path: str) -> "tuple[Floats, Ints]":
+    from tracemesh.formats.meshes import read_mesh
+
+    return read_mesh(read_bytes(path), Path(path).suffix.lstrip("."), path)
+
+
+def _evaluated_mesh(
+    mesh: "tuple[Floats, Ints]", truth: "tuple[Floats, Ints]", chosen: argparse.Namespace
+) -> "Evaluation":
+    from tracemesh.geometry.comparison.evaluation import evaluate, hausdorff_distance, vertex_normals
+
+    vertices, faces = mesh
+    measured = evaluate(vertices, vertex_normals(vertices, faces), *truth, align=chosen.align)
+    if not chosen.both_ways:
+        return measured
+    distance = hausdorff_distance(measured.placement.apply(vertices), faces, *truth)
+    return replace(measured, hausdorff=100 * distance / measured.diagonal)
 
 
 def _simulate(chosen: argparse.Namespace) -> int:

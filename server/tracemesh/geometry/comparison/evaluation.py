@@ -20,6 +20,7 @@ class Evaluation:
 
     normal_deg: mean angle to the true normals, degrees; None when no normals were given. placement: how the points
     were aligned first. distance: (n,) m, of every point; signed: (n,) m, the same, negative inside the true surface.
+    hausdorff: %, the largest distance of either surface's vertices to the other; None where nobody looked both ways.
     """
 
     mean: float
@@ -31,10 +32,11 @@ class Evaluation:
     placement: Placement
     distance: Floats
     signed: Floats
+    hausdorff: float | None = None
 
     def summary(self) -> dict[str, object]:
         """The figures as plain JSON."""
-        return {
+        figures: dict[str, object] = {
             "mean": self.mean,
             "rms": self.rms,
             "max": self.max,
@@ -42,10 +44,13 @@ class Evaluation:
             "unit": "percent of the truth's diagonal",
             "normal_deg": self.normal_deg,
         }
+        return figures if self.hausdorff is None else {**figures, "hausdorff": self.hausdorff}
 
     def text(self) -> str:
         """The figures for people."""
         lines = [f"{name:5}{getattr(self, name):10.4f} %" for name in ("mean", "rms", "max", "min")]
+        if self.hausdorff is not None:
+            lines.append(f"both ways, at most {self.hausdorff:.4f} % (Hausdorff distance)")
         lines.append(f"of the truth's diagonal, {self.diagonal:.4g} m")
         if self.normal_deg is not None:
             lines.append(f"normals off by {self.normal_deg:.3g} degrees on average")
