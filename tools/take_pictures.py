@@ -4,14 +4,19 @@
 """
 
 import json
+import os
+import secrets
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
+import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,9 +25,11 @@ from playwright.sync_api import Browser, CDPSession, Page, expect, sync_playwrig
 from scipy.spatial.transform import Rotation
 
 from tracemesh.formats.meshes import write_triangles
+from tracemesh.formats.recordings import recording_from_simulation, write_recording
 from tracemesh.geometry.simulated.moving_arrays import NOISE, lattice
 from tracemesh.geometry.simulated.shapes import leaf
-from tracemesh.wire.device import Device, Hello
+from tracemesh.geometry.simulated.simulation import plan_scan, simulate_scan
+from tracemesh.wire.device import Device, Hello, NodeMark
 from tracemesh_bridge.sources.virtual_array import declare, measure
 
 PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
@@ -33,6 +40,8 @@ FLAGS = [
 DESK, PHONE = {"width": 1280, "height": 760}, {"width": 390, "height": 844}
 SENSORS = ["accelerometer", "gyroscope", "magnetometer"]
 LOOKS = ("Shaded", "Isophotes", "Reflection lines", "Normal map", "Mean curvature", "Gaussian curvature")
+THEMES: tuple[tuple[str, Literal["light", "dark"]], ...] = (("", "light"), ("dark-", "dark"))
+"""What the names of pictures begin with, by theme."""
 PATIENCE = 60_000
 """ms until something that should be seen counts as missing."""
 
@@ -47,6 +56,8 @@ def main(chosen: list[str]) -> None:
             show_page(browser, address)
             show_array(browser, address)
             show_theme_and_phone(browser, address)
+            show_measured(browser, address.split("/#/")[0])
+            show_sharing(browser)
         browser.close()
 
 
@@ -112,17 +123,16 @@ def show_array(browser: Browser, address: str) -> None:
     device = Device(id="lattice", kind="array", array=declare(moving))
     readings = [measure(moving, n / 30, NOISE, generator).model_copy(update={"seq": n}) for n in range(60)]
     lines = [m.model_dump_json(exclude_none=True) for m in (Hello(recording="lattice", device=device), *readings)]
-    headers = {"Content-Type": "application/json"}
-    for path, body in (("sessions", b'{"id": "lattice"}'), ("sessions/lattice/recordings", "\n".join(lines).encode())):
-        request = urllib.request.Request(f"{origin}/api/v1/{path}", body, headers)
-        urllib.request.urlopen(request, timeout=20).close()
-    page = browser.new_page(viewport=DESK, color_scheme="light", reduced_motion="reduce")
-    page.goto(f"{origin}/#/sessions/lattice")
-    expect(page.locator("canvas")).to_have_attribute("data-reading", "59")
-    page.get_by_role("button", name="Reconstruct").click()
-    expect(page.locator("canvas")).to_have_attribute("data-surface", "shown")
-    keep(page, "array")
-    page.close()
+    post(origin, "/sessions", b'{"id": "lattice"}')
+    post(origin, "/sessions/lattice/recordings", "\n".join(lines).encode())
+    for name, theme in THEMES:
+        page = browser.new_page(viewport=DESK, color_scheme=theme, reduced_motion="reduce")
+        page.goto(f"{origin}/#/sessions/lattice")
+        expect(page.locator("canvas")).to_have_attribute("data-reading", "59")
+        page.get_by_role("button", name="Reconstruct").click()
+        expect(page.locator("canvas")).to_have_attribute("data-surface", "shown")
+        keep(page, f"{name}array")
+        page.close()
 
 
 def compared(page: Page) -> None:
@@ -223,6 +233,75 @@ def held(browser: Browser, origin: str, name: str, theme: Literal["light", "dark
     phone.get_by_role("button", name="Use this device's sensors").click()
     lead(phone, hand, 0.0, 0.1)
     return phone, hand
+
+
+def show_measured(browser: Browser, origin: str) -> None:
+    """A scan without marks whose device has a calibration that is not used: nodes were found, in either theme."""
+    recording = recording_from_simulation(simulate_scan(plan_scan(leaf())), "leaf")
+    left = [message for message in recording.messages if not isinstance(message, NodeMark)]
+    unmarked = replace(recording, messages=[m.model_copy(update={"seq": n}) for n, m in enumerate(left)])
+    session = create(origin, "Unmarked leaf")
+    post(origin, f"/sessions/{session}/recordings", write_recording(unmarked).encode())
+    calibration = {"device": "simulated", "made": "2026-05-03T10:00:00Z", "place": "the lab", "circumference": 0.2}
+    post(origin, "/devices/simulated/calibrations", json.dumps({"calibration": calibration}).encode())
+    for name, theme in THEMES:
+        page = browser.new_page(viewport=DESK, color_scheme=theme, reduced_motion="reduce")
+        page.goto(f"{origin}/#/sessions/{session}")
+        page.get_by_role("button", name="Find unmarked nodes").click()
+        expect(page.get_by_text("Calibration 1 is available; it is not used.")).to_be_visible()
+        expect(page.get_by_role("button", name="Accept").first).to_be_visible()
+        keep(page, f"{name}found-nodes")
+        page.close()
+
+
+def show_sharing(browser: Browser) -> None:
+    """The owner's panel with the code by which a phone comes in, in either theme."""
+    with tempfile.TemporaryDirectory() as folder, closed_server(Path(folder)) as address:
+        origin = address.split("/?")[0]
+        for name, theme in THEMES:
+            context = browser.new_context(viewport=DESK, color_scheme=theme, reduced_motion="reduce")
+            page = context.new_page()
+            page.goto(address)
+            page.get_by_label("Name of the new session").fill("Lamp")
+            page.get_by_role("button", name="New session").click()
+            page.get_by_role("button", name="Share").click()
+            page.get_by_role("button", name="Let a phone scan").click()
+            expect(page.get_by_role("img", name="QR code of the scan page")).to_be_visible()
+            assert page.url.startswith(origin)
+            keep(page, f"{name}share")
+            context.close()
+
+
+@contextmanager
+def closed_server(folder: Path) -> Iterator[str]:
+    """A server that demands a token; the address that lets its owner in."""
+    token = secrets.token_urlsafe(24)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "tracemesh", "serve", "--port", str(port), "--data-dir", str(folder)]
+    process = subprocess.Popen(command, env={**os.environ, "TRACEMESH_TOKEN": token}, stdout=subprocess.DEVNULL)
+    try:
+        while process.poll() is None and not answers(port):
+            time.sleep(0.1)
+        yield f"http://127.0.0.1:{port}/?token={token}"
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(30)
+
+
+def answers(port: int) -> bool:
+    """Whether somebody listens there."""
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=1).close()
+    except OSError:
+        return False
+    return True
+
+
+def post(origin: str, path: str, body: bytes) -> None:
+    """Send something to the REST API."""
+    headers = {"Content-Type": "application/json"}
+    urllib.request.urlopen(urllib.request.Request(f"{origin}/api/v1{path}", body, headers), timeout=20).close()
 
 
 def create(origin: str, name: str) -> str:
