@@ -25,7 +25,7 @@ from benchmarks import (
 from benchmarks.data import ROOT, Data
 from benchmarks.machine import machine, revision
 from benchmarks.measuring import yardstick
-from benchmarks.report import read_report, record, write_report
+from benchmarks.report import elsewhere, read_report, record, write_report
 from benchmarks.table import Table
 
 TABLES: dict[str, Callable[[Data], Table]] = {
@@ -58,10 +58,14 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "tables", nargs="*", metavar="TABLE", help=f"one of {', '.join(TABLES)}; all when none is named"
     )
-    chosen = parser.parse_args(arguments).tables or list(TABLES)
+    parser.add_argument("--anew", action="store_true", help="drop the tables of another machine that are not named")
+    wanted = parser.parse_args(arguments)
+    chosen = wanted.tables or list(TABLES)
     if unknown := sorted(set(chosen) - set(TABLES)):
         parser.error(f"no table {', '.join(unknown)}: there are {', '.join(TABLES)}")
     data, folder = Data.beside_checkout(), ROOT / "docs"
+    if wanted.tables and not wanted.anew and (differs := elsewhere(folder / "benchmarks.json", machine())):
+        parser.error(f"docs/benchmarks.json is of another machine ({differs}): name no table, or --anew drops the rest")
     report = read_report(folder / "benchmarks.json", machine())
     for name in chosen:
         standard, now = yardstick(), datetime.now(UTC).date().isoformat()

@@ -50,6 +50,21 @@ def read_report(path: Path, machine: dict[str, object]) -> Report:
     return Report(machine=machine, tables={})
 
 
+def elsewhere(path: Path, machine: dict[str, object]) -> str:
+    """What differs on the machine of the saved report, in words; nothing where it is this one, or there is none."""
+    if not path.exists():
+        return ""
+    saved: Report = json.loads(path.read_text())
+    there, here = (_flat(known) for known in (saved["machine"], machine))
+    names = sorted(name for name in there | here if there.get(name) != here.get(name))
+    return ", ".join(f"{name} {there.get(name)} there, {here.get(name)} here" for name in names)
+
+
+def _flat(machine: dict[str, object]) -> dict[str, object]:
+    packages = machine.get("packages")
+    return {**machine, "packages": None, **(packages if isinstance(packages, dict) else {})}
+
+
 def write_report(folder: Path, report: Report, order: list[str]) -> None:
     """Write both files, tables in the given order, and the pages that quote them."""
     tables = {name: report["tables"][name] for name in order if name in report["tables"]}

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks import accuracy, arrays, crossings, growth, lengths, meshes, nodes, noisy, regression, surfacing, times
-from benchmarks.data import Data, noisy_scan
-from benchmarks.report import read_report, record, write_report
+from benchmarks.__main__ import main
+from benchmarks.data import ROOT, Data, noisy_scan
+from benchmarks.report import elsewhere, read_report, record, write_report
 from benchmarks.table import Column, Table
 from benchmarks.thesis_energy import ThesisEnergy
 from tracemesh.geometry.curves.energy import EnergyPoint
@@ -58,6 +59,21 @@ def test_report_keeps_other_tables_of_the_same_machine_only(tmp_path: Path) -> N
     assert json.loads((tmp_path / "benchmarks.json").read_text())["tables"]["one"]["table"]["rows"] == [["x"]]
     assert list(read_report(tmp_path / "benchmarks.json", machine)["tables"]) == ["one"]
     assert read_report(tmp_path / "benchmarks.json", {**machine, "processor": "q"})["tables"] == {}
+    assert elsewhere(tmp_path / "benchmarks.json", machine) == ""
+    assert elsewhere(tmp_path / "none.json", machine) == ""
+    other: dict[str, object] = {"processor": "p", "packages": {"numpy": "3"}}
+    assert elsewhere(tmp_path / "benchmarks.json", other) == "numpy 2 there, 3 here"
+
+
+def test_tables_of_another_machine_are_not_dropped_unasked(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "77")
+    before = (ROOT / "docs" / "benchmarks.json").read_bytes()
+    with pytest.raises(SystemExit):
+        main(["regression"])
+    assert "blas_threads 1 there, 77 here" in capsys.readouterr().err
+    assert (ROOT / "docs" / "benchmarks.json").read_bytes() == before
 
 
 def test_surfacing(shared_data: Path) -> None:
