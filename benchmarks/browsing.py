@@ -38,12 +38,12 @@ COLLECTIONS = 5
 
 COLUMNS = (Column("what"), Column("budget"), Column("measured", ".1f"), Column("unit"))
 NOTES = (
-    """Built pages in headless Chromium on the same machine, WebGL in software. First load: every script and style
-    that a page needs at once, compressed with gzip. First view: from the address to the surface on the screen, of a
-    session with so many samples, as far apart drawn as an eye can tell, and triangles; the median of five.
-    Slider: from its input event until the answer has come, and to the end of the first frame that shows the network
-    so asked for, of a noisy leaf cut as finely as the slider allows; each move asks for something new, once the one
-    before was seen; the first one is not counted. Script: what the browser reports as script time while messages
+    """Built pages in headless Chromium on the same machine, WebGL in software. First load: every script and style that
+    a page needs at once, compressed with gzip. First view: from the address to the surface on the screen, of a
+    session with so many samples, as far apart drawn as an eye can tell, and triangles; the median of five. Slider:
+    from its input event until the answer has come, and to the end of the first frame that shows the network so asked
+    for, of the noisy built-in cone cut as finely as the slider allows; each move asks for something new, once the
+    one before was seen; the first one is not counted. Script: what the browser reports as script time while messages
     with so many new live points come in one by one, per message. Heap: of the page after garbage collection, at the
     end of so many minutes of live data; its growth is that less what it was after a tenth of them. What the data
     need is the growth, over the same time, of the heap of a page that is only then opened on them. The ride is sent
@@ -136,7 +136,7 @@ MOVE = """(slider, handle) => new Promise((seen) => {
 def _sliders(page: Page, address: str) -> list[tuple[Cell, ...]]:
     """Moves of the step and of a smoothing length, near the finest step."""
     session = _call(address, "/sessions", b"{}")["id"]
-    _call(address, f"/sessions/{session}/recordings", write_rawnet(noisy_scan("leaf").scan).encode())
+    _call(address, f"/sessions/{session}/recordings", write_rawnet(noisy_scan("cone").scan).encode())
     page.goto(f"http://{address}/#/sessions/{session}")
     page.get_by_role("button", name="5 interior").wait_for()
     page.wait_for_load_state("networkidle")

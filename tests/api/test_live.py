@@ -114,7 +114,7 @@ def test_the_network_is_solved_while_it_is_scanned(server: Any, ride: Any, share
         for text in messages:
             rider.socket.send(text)
         rider.wait_for_ack(len(messages) - 1)
-        networks = watch(socket, lambda m: m["type"] == "live.network" and _closes(m))
+        networks = watch(socket, lambda m: m["type"] == "live.network" and _closes(m), limit=400)
     curves = {c["index"]: np.array(c["positions"]).reshape(-1, 3) for c in networks[-1]["curves"]}
     assert len(curves) == 5
     apex = max(p[:, 2].max() for p in curves.values())
@@ -123,9 +123,13 @@ def test_the_network_is_solved_while_it_is_scanned(server: Any, ride: Any, share
 
 
 def _closes(network: dict[str, Any]) -> bool:
-    """The closed base curve ends where it begins: dead reckoning alone never does."""
-    points = np.array(network["curves"][0]["positions"]).reshape(-1, 3)
-    return len(network["curves"]) == 5 and np.linalg.norm(points[-1] - points[0]) < 1e-9
+    """All five curves begin and end at nodes: dead reckoning alone never does."""
+    nodes = np.array([node["position"] for node in network["nodes"]]).reshape(-1, 3)
+    curves = [np.array(curve["positions"]).reshape(-1, 3) for curve in network["curves"]]
+    if len(curves) < 5 or not len(nodes):
+        return False
+    ends = np.array([curve[k] for curve in curves for k in (0, -1)])
+    return bool((np.linalg.norm(ends[:, None] - nodes, axis=2).min(axis=1) < 2e-5).all())
 
 
 def test_edits_are_drawn(server: Any, ride: Any, line: Any) -> None:
