@@ -31,7 +31,9 @@ SEEN_WHOLE = """() => {
   );
 }"""
 """All nodes are in the view, and fill it one way or the other."""
-NODES_DOWN = "() => [...document.querySelectorAll('circle.node')].map((node) => Number(node.getAttribute('cy')))"
+NODES = """() => [...document.querySelectorAll("circle.node")].map((node) =>
+  [node.cx, node.cy].map((at) => at.baseVal.value),
+)"""
 
 
 @pytest.fixture(scope="module")
@@ -118,11 +120,14 @@ def test_what_was_seen_whole_stays_so_in_a_view_of_another_size(
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_function(SEEN_WHOLE)
 
-    view = page.locator("main > canvas")
-    view.hover(position={"x": 200, "y": 200})
+    page.locator("main > canvas").hover(position={"x": 200, "y": 200})
+    seen = page.evaluate(NODES)
     page.mouse.wheel(0, -120)  # the camera is in somebody's hands now
+    page.wait_for_function(f"(seen) => String(({NODES})()) !== String(seen)", arg=seen)
     page.wait_for_timeout(500)
-    before = page.evaluate(NODES_DOWN)
+    seen = page.evaluate(NODES)
     page.set_viewport_size({"width": 1300, "height": 500})
+    page.wait_for_function(f"(seen) => String(({NODES})()) !== String(seen)", arg=seen)
     page.wait_for_timeout(500)
-    assert page.evaluate(NODES_DOWN) == pytest.approx(before, abs=1)
+    heights = [[y for _, y in nodes] for nodes in (seen, page.evaluate(NODES))]
+    assert heights[1] == pytest.approx(heights[0], abs=1)
