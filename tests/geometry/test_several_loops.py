@@ -181,6 +181,18 @@ def test_a_hole_whose_rim_would_turn_inside_out(hole: tuple[float, float, float]
     sound(bent_plate([hole], along_y, bend), 0, 2)
 
 
+@pytest.mark.parametrize("start", [0, 5])
+def test_where_a_band_is_cut_open_does_not_show(start: int) -> None:
+    """Between two parallels of a sphere no way across is shorter than others: the cut is where the curves begin."""
+    radius = np.sqrt(0.75)
+    rings = circles([((0, 0, 0.5), (0, 0, 1), radius), ((0, 0, -0.5), (0, 0, -1), radius)], radial, True)
+    begun = np.concatenate([np.roll(s.points[:-1], -start) for s in rings.segments])
+    mesh = sound(replace(rings, points=rings.points[begun], normals=rings.normals[begun]), 0, 2)
+    height, away = mesh.vertices[:, 2], np.linalg.norm(mesh.vertices, axis=1) - 1
+    assert abs(away).max() < 1e-4
+    assert abs(away - np.polyval(np.polyfit(height, away, 6), height)).max() < 1e-6
+
+
 def test_plate_with_filled_circles_is_a_disk() -> None:
     network = plate([(-0.4, 0.0, 0.25), (0.4, 0.0, 0.25)], boundary=False)
     sound(network, 1, 1)
