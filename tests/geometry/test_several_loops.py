@@ -181,6 +181,16 @@ def test_a_hole_whose_rim_would_turn_inside_out(hole: tuple[float, float, float]
     sound(bent_plate([hole], along_y, bend), 0, 2)
 
 
+@pytest.mark.parametrize(
+    "holes", [[(-0.4, 0.0, 0.25), (0.4, 0.0, 0.25)], [(-0.5, 0.2, 0.12), (0.1, -0.4, 0.2)]], ids=["alike", "unlike"]
+)
+def test_triangles_that_the_surface_put_out_of_shape_are_unrolled_again(
+    holes: list[tuple[float, float, float]],
+) -> None:
+    """A dome whose rim is as steep as 3 leads far from the surface that its patch was first unrolled from."""
+    sound(bent_plate(holes, -1.0, 1.5), -1, 3)
+
+
 @pytest.mark.parametrize("start", [0, 5])
 def test_where_a_band_is_cut_open_does_not_show(start: int) -> None:
     """Between two parallels of a sphere no way across is shorter than others: the cut is where the curves begin."""

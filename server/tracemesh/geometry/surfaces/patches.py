@@ -126,14 +126,15 @@ def nearly_flat(complex_: CellComplex) -> bool:
     return True
 
 
-def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats) -> bool:
-    """Whether triangles in space are nearly as well shaped as in the plane, and none is turned over. vertices:
-    (n, 3).
+def unrolled_well(patches: PatchMesh, vertices: Floats, normals: Floats, degrees: float) -> bool:
+    """Whether triangles in space are nearly as well shaped as in the plane, or well enough, and none is turned over.
+
+    vertices, normals: (n, 3). degrees: the smallest angle that is enough.
     """
     flat = np.column_stack([patches.planar, np.zeros(len(patches.planar))])
     in_plane = triangle_angles(flat, patches.planar_faces).min(1)
     in_space = triangle_angles(vertices, patches.faces).min(1)
-    enough = np.minimum(0.75 * in_plane, np.radians(20))
+    enough = np.minimum(0.75 * in_plane, np.radians(degrees))
     return bool((in_space >= enough).all()) and not inverted_faces(vertices, patches.faces, normals).any()
 
 

@@ -8,9 +8,8 @@ from tracemesh.geometry.surfaces.surface_stages import (
     SurfaceResult,
     finished,
     prepared,
-    unrolled_patches,
 )
-from tracemesh.geometry.surfaces.two_scales import solved_surface
+from tracemesh.geometry.surfaces.whole_surface import whole_surface
 
 __all__ = ["Progress", "SurfaceParameters", "SurfaceResult", "span_surface"]
 
@@ -25,6 +24,4 @@ def span_surface(
     """
     parameters, stages = parameters or SurfaceParameters(), Stages(progress)
     complex_ = prepared(network, parameters, stages)
-    patches, flat = unrolled_patches(complex_, parameters, stages)
-    vertices, normals, refinement = solved_surface(complex_, patches, flat, parameters, stages)
-    return finished(complex_, patches, vertices, normals, refinement, stages)
+    return finished(complex_, *whole_surface(complex_, parameters, stages), stages)

@@ -26,9 +26,9 @@ from tracemesh.geometry.surfaces.surface_stages import (
     finished,
     linear_patches,
     prepared,
-    unrolled_patches,
 )
-from tracemesh.geometry.surfaces.two_scales import LARGEST_REFINED, solved_surface
+from tracemesh.geometry.surfaces.two_scales import LARGEST_REFINED
+from tracemesh.geometry.surfaces.whole_surface import whole_surface
 
 Mask = NDArray[np.bool_]
 
@@ -70,8 +70,7 @@ class SurfaceSolver:
         changed = np.array([key not in self._known for key in keys])
         if changed.all() or self._whole or complex_.groups or self._parameters.soft is not None:
             changed[:] = True
-            patches, flat = unrolled_patches(complex_, self._parameters, stages)
-            vertices, normals, refinement = solved_surface(complex_, patches, flat, self._parameters, stages)
+            patches, vertices, normals, refinement = whole_surface(complex_, self._parameters, stages)
             self._refined = bool(refinement["used"])
             self._whole = self._refined and patches.count > LARGEST_REFINED
         else:

@@ -23,6 +23,7 @@ from tracemesh.geometry.surfaces.subdivision import graded, subdivided
 Progress = Callable[[str, float], None]
 COARSE = 3.0  # edges inside the patches of the first solve, which only serves to unroll them, over those of the mesh
 LARGEST_UNROLLS = 4
+UNROLLED_ANGLE = 20.0  # degrees that are enough for a triangle, whatever it had in the plane
 FARTHEST = 2.0  # distance of a vertex from the middle of the network, over its diagonal
 
 
@@ -121,10 +122,9 @@ def unrolled_patches(complex_: CellComplex, parameters: SurfaceParameters, stage
         stages.begin("patches", 0.1 + 0.05 * attempt)
         patches = triangulate_patches(complex_, parameters.mesh_size, COARSE if trial else 1.0, last)
         stages.begin("surface", 0.12 + 0.05 * attempt)
-        flat = cotangent_laplacian(patches.planar[patches.planar_faces], patches.faces, patches.count)
-        vertices, spread = linear_surface(flat, patches.faces, points, normals, patches.lift)
+        vertices, spread = surface_over(complex_, patches)
         if not trial:
-            if unrolled_well(patches, vertices, spread):
+            if unrolled_well(patches, vertices, spread, UNROLLED_ANGLE):
                 break
             vertices, spread = rebuilt_surface(vertices, patches.faces, points, normals, patches.lift)
         last, trial = (patches, vertices), False
@@ -132,6 +132,13 @@ def unrolled_patches(complex_: CellComplex, parameters: SurfaceParameters, stage
         points = _softened(complex_.network, patches, vertices, spread, parameters.soft)
         vertices = np.vstack([points, vertices[len(points) :]])
     return patches, vertices
+
+
+def surface_over(complex_: CellComplex, patches: PatchMesh) -> tuple[Floats, Floats]:
+    """Vertices (n, 3), m, and normals (n, 3) in the metric of the plane that every patch lies in."""
+    network = complex_.network
+    flat = cotangent_laplacian(patches.planar[patches.planar_faces], patches.faces, patches.count)
+    return linear_surface(flat, patches.faces, network.points, network.normals, patches.lift)
 
 
 def settled(
