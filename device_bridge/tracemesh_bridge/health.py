@@ -89,9 +89,9 @@ class Host:
 
 
 def dip(acceleration: Vector, magnetic: Vector) -> float:
-    """Angle of the field below the horizontal, rad, from the two vectors a device measures at rest (any units)."""
-    norm = math.hypot(*acceleration) * math.hypot(*magnetic)
-    cosine = sum(a * m for a, m in zip(acceleration, magnetic, strict=True)) / norm
+    """Angle of the field below the horizontal, rad, from two vectors measured at rest, any units, not 0."""
+    up, field = math.hypot(*acceleration), math.hypot(*magnetic)
+    cosine = sum(a / up * (m / field) for a, m in zip(acceleration, magnetic, strict=True))
     return math.asin(max(-1.0, min(1.0, -cosine)))
 
 
@@ -111,7 +111,12 @@ def _field(recent: Sequence[Reading]) -> list[str]:
     if not pairs:
         return []
     return [
-        f"|acc| {statistics.fmean(math.hypot(*a) for a, _ in pairs):.3g}",
-        f"|mag| {statistics.fmean(math.hypot(*m) for _, m in pairs):.3g}",
-        f"dip {math.degrees(statistics.fmean(dip(a, m) for a, m in pairs)):.1f}°",
+        f"|acc| {_mean([math.hypot(*a) for a, _ in pairs]):.3g}",
+        f"|mag| {_mean([math.hypot(*m) for _, m in pairs]):.3g}",
+        f"dip {math.degrees(_mean([dip(a, m) for a, m in pairs])):.1f}°",
     ]
+
+
+def _mean(values: Sequence[float]) -> float:
+    """Also of values whose sum is more than a float holds, as a device that is out of order may send them."""
+    return math.fsum(value / len(values) for value in values)

@@ -10,6 +10,8 @@ from tracemesh_bridge.source import Reading
 
 MOUNTING: Quaternion = (0.5, 0.5, 0.5, 0.5)
 """A phone lies on the surface with its back and moves towards its top: t = y, N = z, B = x of the device."""
+LATEST = 1e12
+"""s, on any clock; what is beyond is no time."""
 JUMP = 1.0
 """s by which a phone's clock may run ahead of the arrival of its readings, from one to the next, and be believed."""
 Sensor = Literal["acceleration", "magnetic", "rotation_rate"]
@@ -54,9 +56,9 @@ class Assembler:
         self._newest[sensor] = vector
 
     def orient(self, time: float, quaternion: Quaternion, received: float) -> Reading | None:
-        """The reading at an orientation (device to ENU), or None if it is no rotation, or the same one again."""
+        """The reading at an orientation (device to ENU); None if that is no rotation, at no time, or the same again."""
         rotation = unit(quaternion)
-        if rotation is None:
+        if rotation is None or abs(time) > LATEST:
             self._health.fault("implausible")
             return None
         if self._last == (time, quaternion):
@@ -73,6 +75,9 @@ class Assembler:
         None until all have spoken, or if it is the same sample again.
         """
         if not {"acceleration", "magnetic", "rotation_rate"} <= self._newest.keys():
+            return None
+        if abs(time) > LATEST:
+            self._health.fault("implausible")
             return None
         if self._last == (time, None):
             self._health.fault("repeated")

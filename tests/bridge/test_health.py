@@ -100,3 +100,11 @@ def test_it_can_be_looked_at_while_a_source_tells_it_more():
         source.join()
         sys.setswitchinterval(interval)
     assert sum(health.faults.values()) == health.received > 0
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-200, 1e200, 1.7e308])
+def test_strengths_are_told_of_any_vectors(size):
+    health = Health()
+    for _ in range(3):
+        health.take(Reading(1.0, 1.0, acceleration=(0.0, 0.0, size), magnetic=(size / 2, 0.0, -size / 2)))
+    assert f"|acc| {size:.3g}" in health.describe(1.0)

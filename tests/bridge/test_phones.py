@@ -23,7 +23,7 @@ from tracemesh_bridge.pose import AGREEING, PoseCheck, turn, unit, verdict
 from tracemesh_bridge.source import Link
 from tracemesh_bridge.sources import phyphox
 from tracemesh_bridge.sources.phyphox import Input, find_inputs, parse_rows, parse_status, query
-from tracemesh_bridge.sources.sensorlogger import SensorLogger
+from tracemesh_bridge.sources.sensorlogger import Translator
 from tracemesh_bridge.sources.sensorlogger_batches import MOST_AHEAD, PATIENCE, Batch, Reorder, parse_batch
 from tracemesh_bridge.sources.sensorserver import SensorServer, SensorServerSettings, parse_event, sensor_url
 
@@ -89,8 +89,8 @@ def event(sensor, values, time=5_000_000_000):
 
 def test_sensorserver_pose(pose, host):
     source = SensorServer(SensorServerSettings("h:8080"), DEVICE, host)
-    source._take(event("accelerometer", gravity(pose)))
-    reading = source._take(event("rotation_vector", [*pose.as_quat().tolist(), 0.1]))
+    source.take(event("accelerometer", gravity(pose)))
+    reading = source.take(event("rotation_vector", [*pose.as_quat().tolist(), 0.1]))
     is_pose(reading, pose)
     assert reading.time == 5.0
 
@@ -109,7 +109,7 @@ def test_sensorserver_raw_streams_are_fused_into_the_pose(pose, host):
             ("magnetic_field", field),
             ("gyroscope", [0.0, 0.0, 0.0]),
         ):
-            readings.append(source._take(event(sensor, values, time)))
+            readings.append(source.take(event(sensor, values, time)))
     kept = [r for r in readings if r is not None]
     assert len(kept) == 200
     assert all(r.quaternion is None for r in kept)
@@ -125,11 +125,11 @@ def test_sensorserver_raw_streams_wait_for_all_three_and_take_none_twice(host):
     source = SensorServer(
         SensorServerSettings("h:8080", ("gyroscope", "accelerometer", "magnetic_field")), DEVICE, host
     )
-    assert source._take(event("gyroscope", [0.0, 0.0, 0.1])) is None
-    assert source._take(event("accelerometer", [0.0, 0.0, 9.81])) is None
-    assert source._take(event("magnetic_field", [0.0, 20.0, -40.0])) is None
-    assert source._take(event("gyroscope", [0.0, 0.0, 0.1])).rotation_rate == (0.0, 0.0, 0.1)
-    assert source._take(event("gyroscope", [0.0, 0.0, 0.1])) is None
+    assert source.take(event("gyroscope", [0.0, 0.0, 0.1])) is None
+    assert source.take(event("accelerometer", [0.0, 0.0, 9.81])) is None
+    assert source.take(event("magnetic_field", [0.0, 20.0, -40.0])) is None
+    assert source.take(event("gyroscope", [0.0, 0.0, 0.1])).rotation_rate == (0.0, 0.0, 0.1)
+    assert source.take(event("gyroscope", [0.0, 0.0, 0.1])) is None
     assert host.health.faults["repeated"] == 1
 
 
@@ -137,8 +137,8 @@ def test_sensorserver_rotation_vector_of_three(host):
     pose = POSES["standing, turned 90"]
     quaternion = pose.as_quat(canonical=True).tolist()
     source = SensorServer(SensorServerSettings("h:8080"), DEVICE, host)
-    source._take(event("accelerometer", gravity(pose)))
-    is_pose(source._take(event("rotation_vector", quaternion[:3])), pose)
+    source.take(event("accelerometer", gravity(pose)))
+    is_pose(source.take(event("rotation_vector", quaternion[:3])), pose)
 
 
 def test_sensorserver_has_another_address_for_one_sensor_than_for_several():
@@ -189,11 +189,7 @@ def logger_message(pose, apple, number=0, time=1_700_000_000_000_000_000):
 
 @pytest.mark.parametrize("apple", [False, True], ids=["android", "ios"])
 def test_sensorlogger_pose(pose, apple, host, said):
-    source = SensorLogger(("127.0.0.1", 0), DEVICE, host)
-    try:
-        readings = list(source._read(parse_batch(logger_message(pose, apple), 0.0)))
-    finally:
-        source._server.server_close()
+    readings = list(Translator(host).readings(parse_batch(logger_message(pose, apple), 0.0)))
     assert len(readings) == 2
     is_pose(readings[-1], pose)
     assert said == ["device: live: phone d"]
@@ -201,13 +197,9 @@ def test_sensorlogger_pose(pose, apple, host, said):
 
 def test_sensorlogger_without_gravity_is_taken_as_it_is(host):
     pose = POSES["standing, turned 90"]
-    source = SensorLogger(("127.0.0.1", 0), DEVICE, host)
     batch = parse_batch(logger_message(pose, apple=False), 0.0)
     only = Batch(0, "s", "d", tuple(e for e in batch.entries if e.name == "orientation"), 0.0)
-    try:
-        reading = next(source._read(only))
-    finally:
-        source._server.server_close()
+    reading = next(Translator(host).readings(only))
     assert np.allclose(turn(reading.quaternion, (1, 0, 0)), pose.apply((1, 0, 0)))
 
 
@@ -271,11 +263,11 @@ CONFIG = {
 def test_phyphox_pose(pose, host):
     source = phyphox.Phyphox("h", DEVICE, host)
     since = {ATTITUDE: 0.0, ACCELEROMETER: 0.0}
-    readings = list(source._read(phyphox_answer(pose, [0.5, 1.0]), since, 9.0))
+    readings = list(source.read(phyphox_answer(pose, [0.5, 1.0]), since, 9.0))
     assert [r.time for r in readings] == [0.5, 1.0]
     is_pose(readings[-1], pose)
     assert since == {ATTITUDE: 1.0, ACCELEROMETER: 0.999}
-    assert list(source._read(phyphox_answer(pose, [0.5, 1.0]), since, 9.1)) == [], "nothing is read twice"
+    assert list(source.read(phyphox_answer(pose, [0.5, 1.0]), since, 9.1)) == [], "nothing is read twice"
 
 
 def test_phyphox_sensors_are_found_by_what_the_experiment_says():

@@ -140,6 +140,7 @@ def test_reads_the_true_meshes(shared_data: Path) -> None:
         (b"no mesh at all", "ply", "cannot be read as ply"),
         (b"", "obj", "wanted triangles, got none"),
         (b"v 0 0 0\nf 1 2 3\n", "obj", "x.obj"),
+        (b"v 0\nv 1\nv 2\nf 1 2 3\n", "obj", "wanted three coordinates"),
         (b"v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", "obj", "vertex 1 is not finite"),
         (b"", "3ds", "wanted a mesh format among glb, obj, ply, stl, got '3ds'"),
     ],

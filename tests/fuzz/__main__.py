@@ -16,6 +16,8 @@ with atheris.instrument_imports(include=["tracemesh", "tracemesh_bridge"]):
     from tests.fuzz.targets import TARGETS
 
 CORPUS = Path(__file__).parent / "corpus"
+BYTES = ("rawnet", "frame", "mesh", "mrider")
+"""Targets whose input is no JSON."""
 
 
 VALUES = (0, -1, 1, 1e308, 1e-300, 2**31, True, None, "", "node", [], {}, [0, 0, 0], [1.0, 0.0, 0.0, 0.0])
@@ -57,7 +59,7 @@ def main() -> None:
     name = sys.argv[1]
     grown = Path(".fuzz") / name
     grown.mkdir(parents=True, exist_ok=True)
-    options = {"custom_mutator": mutate_json} if name in ("network", "recording") else {}
+    options = {} if name in BYTES else {"custom_mutator": mutate_json}
     atheris.Setup([sys.argv[0], *sys.argv[2:], str(grown), str(CORPUS / name)], TARGETS[name], **options)
     atheris.Fuzz()
 

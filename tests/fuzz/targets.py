@@ -7,10 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tests.fuzz.device_targets import array, mrider, phyphox, sensorlogger, sensorserver
 from tracemesh.errors import TracemeshError
+from tracemesh.formats.calibrations import corrections, read_calibration, write_calibration
+from tracemesh.formats.meshes import read_mesh
 from tracemesh.formats.networks import read_network, write_network
 from tracemesh.formats.rawnet import read_rawnet, write_rawnet
 from tracemesh.formats.recordings import read_recording, scan_from_recordings, write_recording
+from tracemesh.wire.device import Device
 from tracemesh_bridge.errors import FrameError
 from tracemesh_bridge.framing import FrameLayout, decode, encode
 
@@ -67,4 +71,30 @@ def frame(data: bytes) -> None:
     assert all(again[i] == data[i] for i in range(layout.length) if i not in layout.unknown)
 
 
-TARGETS: dict[str, Callable[[bytes], None]] = {t.__name__: t for t in (rawnet, network, recording, frame)}
+def calibration(data: bytes) -> None:
+    """What was written is read as the same; what it corrects stays finite."""
+    try:
+        found = read_calibration(data.decode("utf-8", "replace"), "fuzz")
+    except TracemeshError:
+        return
+    assert read_calibration(write_calibration(found)) == found
+    device = Device(id=found.device, kind="k", calibration=found)
+    for correct in corrections(device).values():
+        assert correct(np.array([[0.0, 0.0, 9.81]])).shape == (1, 3)
+
+
+def mesh(data: bytes) -> None:
+    """In whatever format it is: finite vertices, and triangles of vertices that there are."""
+    for extension in ("obj", "ply", "stl", "glb"):
+        try:
+            vertices, faces = read_mesh(data, extension, "fuzz")
+        except TracemeshError:
+            continue
+        assert vertices.shape[1:] == faces.shape[1:] == (3,)
+        assert np.isfinite(vertices).all()
+        assert 0 <= faces.min() <= faces.max() < len(vertices)
+
+
+FILES = (rawnet, network, recording, frame, calibration, mesh)
+DEVICES = (sensorserver, sensorlogger, phyphox, array, mrider)
+TARGETS: dict[str, Callable[[bytes], None]] = {target.__name__: target for target in (*FILES, *DEVICES)}

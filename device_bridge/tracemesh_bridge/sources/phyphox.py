@@ -6,6 +6,7 @@ accelerometer includes gravity with Android's sign on both. Which buffers hold t
 
 import http.client
 import json
+import reprlib
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -79,7 +80,7 @@ class Phyphox:
                 return
             session = status.session
             before = dict(since)
-            yield from self._read(answer, since, received)
+            yield from self.read(answer, since, received)
             if since != before:
                 newest = received
             elif received - newest > SILENT and self._began_again(inputs[0], since):
@@ -88,7 +89,8 @@ class Phyphox:
                 self._host.link.to(LinkState.STALE, "the experiment does not run: press play on the phone")
             stop.wait(POLL if status.measuring else IDLE)
 
-    def _read(self, answer: Any, since: dict[Input, float], received: float) -> Iterator[Reading]:
+    def read(self, answer: Any, since: dict[Input, float], received: float) -> Iterator[Reading]:
+        """Readings of what came after `since` (s), which moves on. Raises BridgeError."""
         rows = [(row, i) for i in since for row in parse_rows(answer, i, since[i])]
         for row, i in sorted(rows, key=lambda r: r[0][0]):
             since[i] = row[0]
@@ -135,7 +137,7 @@ def find_inputs(config: Any) -> tuple[Input, ...]:
         inputs = [(str(i["source"]), _outputs(i)) for i in config["inputs"]]
         title = str(config.get("title", ""))
     except (TypeError, KeyError, AttributeError) as error:
-        raise BridgeError(f"wanted phyphox's description of an experiment, got {str(config)[:80]}") from error
+        raise BridgeError(f"wanted phyphox's description of an experiment, got {_begin(config)}") from error
     wanted = {"attitude": ATTITUDE, **dict.fromkeys(SENSORS, ("t", "x", "y", "z"))}
     usable = [Input(s, tuple(o[k] for k in wanted[s])) for s, o in inputs if s in wanted and set(wanted[s]) <= set(o)]
     if not any(i.source == "attitude" for i in usable):
@@ -168,7 +170,7 @@ def parse_status(answer: Any) -> Status:
     try:
         return Status(str(answer["status"]["session"]), bool(answer["status"]["measuring"]))
     except (TypeError, KeyError) as error:
-        raise BridgeError(f"wanted buffers from phyphox, got {str(answer)[:80]}") from error
+        raise BridgeError(f"wanted buffers from phyphox, got {_begin(answer)}") from error
 
 
 def parse_rows(answer: Any, i: Input, since: float) -> list[_Row]:
@@ -177,8 +179,13 @@ def parse_rows(answer: Any, i: Input, since: float) -> list[_Row]:
         columns = [answer["buffer"][name]["buffer"] for name in i.buffers]
         rows = [tuple(float(v) for v in row) for row in zip(*columns, strict=False) if None not in row]
     except (TypeError, KeyError, ValueError, OverflowError) as error:
-        raise BridgeError(f"wanted the buffers {', '.join(i.buffers)} from phyphox, got {str(answer)[:80]}") from error
+        raise BridgeError(f"wanted the buffers {', '.join(i.buffers)} from phyphox, got {_begin(answer)}") from error
     return [row for row in rows if row[0] > since and all(v - v == 0 for v in row)]
+
+
+def _begin(answer: Any) -> str:
+    """How an answer begins, for people; one may be nested deeper than Python prints."""
+    return reprlib.repr(answer)[:80]
 
 
 def _outputs(description: Any) -> dict[str, str]:

@@ -59,16 +59,17 @@ class Program:
                 return
             *lines, rest = (rest + data).split(b"\n")
             rest = rest if len(rest) < MAX_LINE else b""
-            yield from (reading for reading in map(self._reading, lines) if reading is not None)
+            yield from (reading for reading in map(self.take, lines) if reading is not None)
 
-    def _reading(self, line: bytes) -> ArrayReading | None:
+    def take(self, line: bytes) -> ArrayReading | None:
+        """The reading in a line, if it is one."""
         received = self._host.clock.now()
         try:
             reading = ArrayReading.model_validate({**json.loads(line), "seq": 0, "received": received})
             why = misfit(self.device.array, reading)
         except ValidationError as error:
             why = error.errors()[0]["msg"]
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, RecursionError):
             why = "wanted a JSON object"
         if why:
             self._bad(why)

@@ -38,10 +38,7 @@ class SensorLogger:
         self._batches: queue.Queue[Batch] = queue.Queue(maxsize=1000)
         self._order = Reorder(host.health)
         self._phone = ""
-        self._convention = _Convention()
-        self._assembler = Assembler(host.health, host.link.note)
-        self._gravity: Vector | None = None
-        self._acceleration: Vector | None = None
+        self._translator = Translator(host)
         try:
             self._server = ThreadingHTTPServer(address, _handler(self._post))
         except OSError as error:
@@ -60,33 +57,9 @@ class SensorLogger:
                     batches = self._order.late(self._host.clock.now())
                 for batch in batches:
                     silent_since = batch.received
-                    yield from self._read(batch)
+                    yield from self._translator.readings(batch)
                 if self._host.clock.now() - silent_since > STALE_AFTER and self._host.link.state is LinkState.LIVE:
                     self._host.link.to(LinkState.STALE, "nothing was posted; is the app still recording?")
-
-    def _read(self, batch: Batch) -> Iterator[Reading]:
-        for entry in sorted(batch.entries, key=lambda e: e.time):
-            reading = self._take(entry, batch.received)
-            if reading is not None:
-                self._host.link.to(LinkState.LIVE, f"phone {batch.phone}")
-                yield reading
-
-    def _take(self, entry: Entry, received: float) -> Reading | None:
-        v = entry.values
-        if entry.name == "gravity":
-            self._gravity = (v["x"], v["y"], v["z"])
-        elif entry.name == "accelerometer" and self._gravity is not None:
-            x, y, z = (v[axis] + g for axis, g in zip("xyz", self._gravity, strict=True))
-            self._acceleration = (x, y, z)
-        elif entry.name in VECTORS:
-            self._assembler.sense(VECTORS[entry.name], (v["x"], v["y"], v["z"]))
-        elif entry.name == "orientation":
-            quaternion = (v["qw"], v["qx"], v["qy"], v["qz"])
-            self._convention.learn(quaternion, self._gravity)
-            if self._acceleration is not None:
-                self._assembler.sense("acceleration", self._convention.force(self._acceleration))
-            return self._assembler.orient(entry.time / 1e9, self._convention.rotation(quaternion), received)
-        return None
 
     def _post(self, body: bytes) -> tuple[int, str]:
         """Status and text of the answer to a POST."""
@@ -117,6 +90,43 @@ class SensorLogger:
             self._server.shutdown()
             thread.join()
             self._server.server_close()
+
+
+class Translator:
+    """Makes readings of what the app posts, whichever convention the phone speaks."""
+
+    def __init__(self, host: Host) -> None:
+        """`host` is told of the phone and of what is wrong with it."""
+        self._host = host
+        self._convention = _Convention()
+        self._assembler = Assembler(host.health, host.link.note)
+        self._gravity: Vector | None = None
+        self._acceleration: Vector | None = None
+
+    def readings(self, batch: Batch) -> Iterator[Reading]:
+        """One reading for each orientation of a POST."""
+        for entry in sorted(batch.entries, key=lambda e: e.time):
+            reading = self._take(entry, batch.received)
+            if reading is not None:
+                self._host.link.to(LinkState.LIVE, f"phone {batch.phone}")
+                yield reading
+
+    def _take(self, entry: Entry, received: float) -> Reading | None:
+        v = entry.values
+        if entry.name == "gravity":
+            self._gravity = (v["x"], v["y"], v["z"])
+        elif entry.name == "accelerometer" and self._gravity is not None:
+            x, y, z = (v[axis] + g for axis, g in zip("xyz", self._gravity, strict=True))
+            self._acceleration = (x, y, z)
+        elif entry.name in VECTORS:
+            self._assembler.sense(VECTORS[entry.name], (v["x"], v["y"], v["z"]))
+        elif entry.name == "orientation":
+            quaternion = (v["qw"], v["qx"], v["qy"], v["qz"])
+            self._convention.learn(quaternion, self._gravity)
+            if self._acceleration is not None:
+                self._assembler.sense("acceleration", self._convention.force(self._acceleration))
+            return self._assembler.orient(entry.time / 1e9, self._convention.rotation(quaternion), received)
+        return None
 
 
 class _Convention:

@@ -104,4 +104,7 @@ def _entry(entry: dict[str, Any]) -> Entry | None:
     values = {key: float(entry["values"][key]) for key in keys}
     if any(v - v != 0 for v in values.values()):
         raise ValueError("not finite")
-    return Entry(name, int(entry["time"]), values)
+    time = int(entry["time"])
+    if abs(time) >= 2**63:
+        raise ValueError("no time")
+    return Entry(name, time, values)

@@ -93,14 +93,15 @@ class SensorServer:
                     return
                 self._link.to(LinkState.STALE, "no sample; does the phone sleep? keep its screen on")
                 continue
-            reading = self._take(text)
+            reading = self.take(text)
             if reading is not None:
                 silent = 0.0
                 self._link.to(LinkState.LIVE, self._url)
                 self._advise(reading.received)
                 yield reading
 
-    def _take(self, text: str | bytes) -> Reading | None:
+    def take(self, text: str | bytes) -> Reading | None:
+        """The reading that a message of the app completes, if it does."""
         received = self._host.clock.now()
         try:
             event = parse_event(text, self._only)

@@ -84,6 +84,8 @@ def _arrays(found: list[Any], name: str, extension: str) -> tuple[Floats, Ints]:
     if extension == "stl":  # which stores each triangle's corners anew
         mesh.merge_vertices()
     vertices, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise InputError(f"{name}: wanted three coordinates of every vertex and three corners of every triangle")
     if not np.isfinite(vertices).all():
         raise InputError(f"{name}: vertex {int((~np.isfinite(vertices).all(axis=1)).argmax())} is not finite")
     if faces.min() < 0 or faces.max() >= len(vertices):
