@@ -3,15 +3,13 @@
 from collections.abc import Callable
 from typing import Literal
 
-from tracemesh.wire.base import Quaternion, Vector
+from tracemesh.wire.base import LARGEST, Quaternion, Vector
 from tracemesh_bridge.health import Health
 from tracemesh_bridge.pose import PoseCheck, unit
 from tracemesh_bridge.source import Reading
 
 MOUNTING: Quaternion = (0.5, 0.5, 0.5, 0.5)
 """A phone lies on the surface with its back and moves towards its top: t = y, N = z, B = x of the device."""
-LATEST = 1e12
-"""s, on any clock; what is beyond is no time."""
 JUMP = 1.0
 """s by which a phone's clock may run ahead of the arrival of its readings, from one to the next, and be believed."""
 Sensor = Literal["acceleration", "magnetic", "rotation_rate"]
@@ -53,12 +51,15 @@ class Assembler:
 
     def sense(self, sensor: Sensor, vector: Vector) -> None:
         """Keep the newest value of a sensor. Acceleration in m/s^2, up at rest; rotation rate in rad/s."""
-        self._newest[sensor] = vector
+        if max(map(abs, vector)) > LARGEST:
+            self._health.fault("implausible")
+        else:
+            self._newest[sensor] = vector
 
     def orient(self, time: float, quaternion: Quaternion, received: float) -> Reading | None:
         """The reading at an orientation (device to ENU); None if that is no rotation, at no time, or the same again."""
         rotation = unit(quaternion)
-        if rotation is None or abs(time) > LATEST:
+        if rotation is None or abs(time) > LARGEST:
             self._health.fault("implausible")
             return None
         if self._last == (time, quaternion):
@@ -76,7 +77,7 @@ class Assembler:
         """
         if not {"acceleration", "magnetic", "rotation_rate"} <= self._newest.keys():
             return None
-        if abs(time) > LATEST:
+        if abs(time) > LARGEST:
             self._health.fault("implausible")
             return None
         if self._last == (time, None):

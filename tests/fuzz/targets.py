@@ -3,18 +3,23 @@
 Errors for people (TracemeshError, FrameError) are answers; anything else that is raised is a fault of the parser.
 """
 
+import json
 from collections.abc import Callable
 
 import numpy as np
+from pydantic import BaseModel
 
 from tests.fuzz.device_targets import array, mrider, phyphox, sensorlogger, sensorserver
+from tracemesh.api.live.meter import Meter
+from tracemesh.api.live.tracker import Accepted, SessionTracker
 from tracemesh.errors import TracemeshError
 from tracemesh.formats.calibrations import corrections, read_calibration, write_calibration
 from tracemesh.formats.meshes import read_mesh
 from tracemesh.formats.networks import read_network, write_network
 from tracemesh.formats.rawnet import read_rawnet, write_rawnet
 from tracemesh.formats.recordings import read_recording, scan_from_recordings, write_recording
-from tracemesh.wire.device import Device
+from tracemesh.wire.arrays import ArrayReading
+from tracemesh.wire.device import Device, Samples
 from tracemesh_bridge.errors import FrameError
 from tracemesh_bridge.framing import FrameLayout, decode, encode
 
@@ -95,6 +100,27 @@ def mesh(data: bytes) -> None:
         assert 0 <= faces.min() <= faces.max() < len(vertices)
 
 
-FILES = (rawnet, network, recording, frame, calibration, mesh)
+def live(data: bytes) -> None:
+    """A recording as somebody watches it: drawn and told of in numbers that browsers read."""
+    try:
+        found = read_recording(data.decode("utf-8", "replace").split("\n"), "fuzz")
+    except TracemeshError:
+        return
+    tracker, meter = SessionTracker(), Meter(found.hello)
+    for message in found.messages:
+        if isinstance(message, Samples):
+            meter.add(message)
+        if not isinstance(message, ArrayReading):
+            for change in tracker.take([Accepted(0, found.hello.device, message.curve, message)]):
+                _told(change)
+    _told(meter.read())
+
+
+def _told(message: BaseModel) -> None:
+    told = json.loads(message.model_dump_json())
+    assert type(message).model_validate(told).model_dump_json() == message.model_dump_json()
+
+
+FILES = (rawnet, network, recording, frame, calibration, mesh, live)
 DEVICES = (sensorserver, sensorlogger, phyphox, array, mrider)
 TARGETS: dict[str, Callable[[bytes], None]] = {target.__name__: target for target in (*FILES, *DEVICES)}

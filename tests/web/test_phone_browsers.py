@@ -75,16 +75,19 @@ IOS = """(answer) => {
   DeviceOrientationEvent.requestPermission = async () => (navigator.userActivation.isActive ? answer : "denied");
   const turn = 4000;
   let begin;
-  const press = (name) => [...document.querySelectorAll("button")].find((e) => e.textContent.trim() === name)?.click();
-  window.lead = () => ((begin = performance.now()), press("Start curve"));
+  const button = (name) => [...document.querySelectorAll("button")].find((e) => e.textContent.trim() === name);
+  window.lead = () => button("Start curve").click();
   setInterval(() => {
+    const stop = button("Stop curve");
+    if (stop) begin ??= performance.now();
     const heading = begin === undefined ? 0 : (360 * (performance.now() - begin)) / turn;
-    if (heading > 350) return press("Stop curve");
+    if (heading > 350) return stop?.click();
     const event = new DeviceOrientationEvent("deviceorientation", { alpha: (437 - heading) % 360, beta: 0, gamma: 0 });
     window.dispatchEvent(Object.defineProperty(event, "webkitCompassHeading", { value: heading }));
   }, 16);
 }"""
-"""A phone flat on a table that turns right, from North; its angles begin anywhere, only its compass knows North."""
+"""A phone flat on a table that turns right, from North, once it records; its angles begin anywhere, only its compass
+knows North."""
 
 
 def test_an_iphone_is_asked_in_a_tap_and_led_by_its_compass(server: Server, phone: Page) -> None:

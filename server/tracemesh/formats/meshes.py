@@ -27,6 +27,8 @@ SURFACE = PBRMaterial(
 )
 OBJ_DIGITS = 9
 """Decimals of a metre."""
+LARGEST = 1e9
+"""m from the origin; what is beyond is no vertex, and is not merged with others within whole numbers."""
 
 
 def write_mesh(
@@ -81,18 +83,23 @@ def read_mesh(content: bytes, extension: str, source: str = "") -> tuple[Floats,
 
 def _arrays(found: list[Any], name: str, extension: str) -> tuple[Floats, Ints]:
     mesh: Any = found[0] if len(found) == 1 else trimesh.util.concatenate(found)
+    _check_vertices(np.array(mesh.vertices, np.float64), name)
     if extension == "stl":  # which stores each triangle's corners anew
         mesh.merge_vertices()
     vertices, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
-    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
-        raise InputError(f"{name}: wanted three coordinates of every vertex and three corners of every triangle")
-    if not np.isfinite(vertices).all():
-        raise InputError(f"{name}: vertex {int((~np.isfinite(vertices).all(axis=1)).argmax())} is not finite")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(
             f"{name}: wanted vertex indices from 0 to {len(vertices) - 1}, got {faces.min()}..{faces.max()}"
         )
     return (_z_up(vertices) if extension == "glb" else vertices), faces
+
+
+def _check_vertices(vertices: Floats, name: str) -> None:
+    if vertices.shape[1:] != (3,):
+        raise InputError(f"{name}: wanted three coordinates of every vertex, got an array of shape {vertices.shape}")
+    wrong = ~(np.abs(vertices) <= LARGEST).all(axis=1)
+    if wrong.any():
+        raise InputError(f"{name}: vertex {int(wrong.argmax())} is not finite, or further away than {LARGEST:g} m")
 
 
 def _glb(mesh: Mesh, network: CurveNetwork | None, provenance: Provenance) -> bytes:

@@ -8,13 +8,13 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tracemesh.wire.base import Count, Message, Quaternion, UnitQuaternion, Vector
+from tracemesh.wire.base import LARGEST, Count, Measured, Message, Quaternion, UnitQuaternion, Vector
 
 MAX_SENSORS = 2000
 """Most sensors of one array."""
 Sensor = Annotated[int, Field(ge=0, lt=MAX_SENSORS)]
 """Number of a sensor: its row in every reading."""
-Spacing = Annotated[float, Field(gt=0)]
+Spacing = Annotated[float, Field(gt=0, le=LARGEST)]
 
 
 class ArrayCurve(Message):
@@ -83,8 +83,8 @@ class ArrayReading(Message):
 
     type: Literal["reading"] = "reading"
     seq: Count
-    time: float = Field(description="s, the device's own clock")
-    received: float | None = Field(default=None, description="s since 1970 UTC, when the bridge had the reading")
+    time: Measured = Field(description="s, the device's own clock")
+    received: Measured | None = Field(default=None, description="s since 1970 UTC, when the bridge had the reading")
     acceleration: list[Vector] | None = Field(default=None, description="sensor axes, up at rest; any unit")
     magnetic: list[Vector] | None = Field(default=None, description="sensor axes; any unit")
     quaternion: list[Quaternion] | None = Field(default=None, description="[w, x, y, z], sensor to ENU")

@@ -15,12 +15,19 @@ def _of_length_one(quaternion: tuple[float, float, float, float]) -> tuple[float
     return quaternion
 
 
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+LARGEST = 1e12
+Measured = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+"""A number that a device says: what is larger is no measurement, and might not stay finite when it is reckoned with."""
+Vector = tuple[Measured, Measured, Measured]
+Quaternion = tuple[Measured, Measured, Measured, Measured]
 """[w, x, y, z], device to world (ENU)."""
+Coordinates = tuple[float, float, float]
+"""Three numbers that were reckoned here."""
 UnitQuaternion = Annotated[Quaternion, AfterValidator(_of_length_one)]
 """[w, x, y, z], a rotation, rounded to at least three decimals."""
 Count = Annotated[int, Field(ge=0, le=2**53 - 1)]
+Ticks = Annotated[int, Field(ge=-(2**31), le=2**31 - 1)]
+"""What a wheel counts: whole turns, and parts of them."""
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 """Chosen by whoever creates the thing; safe in a URL and in a file name."""
 

@@ -8,13 +8,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AwareDatetime, Field, model_validator
 
-from tracemesh.wire.base import Identifier, Message, Name, UnitQuaternion, Vector
+from tracemesh.wire.base import LARGEST, Identifier, Message, Name, Ticks, UnitQuaternion, Vector
 
 MAX_READINGS = 20_000
 """Most readings of which a calibration is made: more make it slower, not better."""
 Version = Annotated[int, Field(ge=1, le=2**31 - 1)]
 """Calibrations of a device are numbered 1, 2, 3, ... as they come; no number is used twice."""
-Ticks = Annotated[int, Field(ge=-(2**31), le=2**31 - 1)]
 Run = list[tuple[Ticks, Ticks]]
 """Wheel ticks [big (turns), small], in order."""
 
@@ -54,7 +53,7 @@ class Calibration(Message):
     dip: float | None = Field(default=None, description="rad, of the field below the horizontal, as corrected")
     dip_spread_before: float | None = Field(default=None, ge=0, description="rad, standard deviation over all poses")
     dip_spread_after: float | None = Field(default=None, ge=0)
-    circumference: float | None = Field(default=None, gt=0, description="of the wheel, m")
+    circumference: float | None = Field(default=None, gt=0, le=LARGEST, description="of the wheel, m")
     source: Name = Field(default="", description="which readings it was made of, for people")
 
     @model_validator(mode="after")

@@ -17,7 +17,19 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, TypeAdapter, model_validator
 
 from tracemesh.wire.arrays import ArrayReading, SensorArray
-from tracemesh.wire.base import PROTOCOL_VERSION, Count, Identifier, Message, Name, Quaternion, UnitQuaternion, Vector
+from tracemesh.wire.base import (
+    LARGEST,
+    PROTOCOL_VERSION,
+    Count,
+    Identifier,
+    Measured,
+    Message,
+    Name,
+    Quaternion,
+    Ticks,
+    UnitQuaternion,
+    Vector,
+)
 from tracemesh.wire.calibration import Calibration
 
 MAX_SAMPLES = 2000
@@ -27,8 +39,8 @@ MAX_SAMPLES = 2000
 class Wheel(Message):
     """An odometer wheel: distance = (big + small / ticks_per_turn) * circumference."""
 
-    circumference: float = Field(default=0.1, gt=0, description="m, travelled in one turn")
-    ticks_per_turn: int = Field(default=500, gt=0)
+    circumference: float = Field(default=0.1, gt=0, le=LARGEST, description="m, travelled in one turn")
+    ticks_per_turn: int = Field(default=500, gt=0, le=10**6)
     offset: Vector = Field(
         default=(0.0, 0.0, 0.0),
         description="m along (tangent, normal, B): where it measures, from the point of the surface under the sensors",
@@ -108,10 +120,12 @@ class Samples(Message):
     seq: Count
     curve: Count
     first_sample: Count = Field(description="number of the block's first sample within its curve")
-    time: list[float] | None = Field(default=None, description="s, the device's own clock")
-    received: list[float] | None = Field(default=None, description="s since 1970 UTC, when the bridge had the sample")
-    ticks: list[tuple[int, int]] | None = Field(default=None, description="wheel: [big (turns), small]")
-    distance: list[float] | None = Field(default=None, description="m along the curve")
+    time: list[Measured] | None = Field(default=None, description="s, the device's own clock")
+    received: list[Measured] | None = Field(
+        default=None, description="s since 1970 UTC, when the bridge had the sample"
+    )
+    ticks: list[tuple[Ticks, Ticks]] | None = Field(default=None, description="wheel: [big (turns), small]")
+    distance: list[Measured] | None = Field(default=None, description="m along the curve")
     acceleration: list[Vector] | None = Field(default=None, description="device axes, up at rest; any unit")
     magnetic: list[Vector] | None = Field(default=None, description="device axes; any unit")
     rotation_rate: list[Vector] | None = Field(default=None, description="rad/s, device axes")

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from tracemesh.wire.base import Count, Identifier, Message, Name, Vector
+from tracemesh.wire.base import Coordinates, Count, Identifier, Message, Name
 from tracemesh.wire.calibration import Version
 from tracemesh.wire.device import Device
 
@@ -69,8 +69,8 @@ class Comparison(Message):
     min: float
     normal_deg: float | None = Field(description="mean angle to the true normals, degrees")
     diagonal: float = Field(description="m, of the truth's bounding box")
-    rotation: list[Vector] = Field(description="rows; a vertex x was placed at scale * rotation x + translation")
-    translation: Vector = Field(description="m")
+    rotation: list[Coordinates] = Field(description="rows; a vertex x was placed at scale * rotation x + translation")
+    translation: Coordinates = Field(description="m")
     scale: float
     signed_distance: list[float] = Field(description="m, of every vertex of mesh.glb; negative inside the truth")
 
@@ -159,8 +159,8 @@ class NetworkNode(Message):
     """A node of the latest network of a session."""
 
     index: Count
-    position: Vector = Field(description="m, world")
-    normal: Vector = Field(description="unit, outward")
+    position: Coordinates = Field(description="m, world")
+    normal: Coordinates = Field(description="unit, outward")
     segments: list[Count] = Field(description="indices of those that begin or end here")
 
 
@@ -324,4 +324,4 @@ class NodePosition(Message):
     """Where a node is, as far as known."""
 
     node: Count
-    position: Vector
+    position: Coordinates
