@@ -81,7 +81,7 @@ def test_the_only_node_of_an_open_curve_parts_it_in_two(measured: Scan, place: f
     along = [float(np.linalg.norm(np.diff(network.points[s.points], axis=0), axis=1).sum()) for s in own]
     assert along == pytest.approx([(0.2, 0.5)[k] for k in kept], rel=0.02)
     for missing in {0, 1} - set(kept):
-        words = f"for what lies {('before', 'after')[missing]} the only node of curve 1, but nothing does"
+        words = f"{('before', 'after')[missing]} the only node of curve 1, but that is less than 2 % of the curve"
         with pytest.raises(ScanError, match=words):
             reconstruct_network(give_lengths(scan, {(0, missing): 0.1}), PARAMETERS)
 

@@ -33,7 +33,10 @@ def add_reconstruct(commands: Commands) -> None:
     parser.add_argument("--network", type=Path, metavar="NET.json", help="also write the curve network")
     parser.add_argument("--report", type=Path, metavar="REPORT.json", help="also write times, sizes, quality, warnings")
     parser.add_argument(
-        "--step", type=step, default="1.6%", help="distance of points: %% of the diagonal, or m (default 1.6%%)"
+        "--step",
+        type=step,
+        default="1.6%",
+        help="distance of points: %% of the estimated diagonal, or m (default 1.6%%)",
     )
     _add_mesh_size(parser)
     _add_smoothing(parser)

@@ -28,7 +28,7 @@ SURFACE = PBRMaterial(
 OBJ_DIGITS = 9
 """Decimals of a metre."""
 LARGEST = 1e9
-"""m from the origin; what is beyond is no vertex, and is not merged with others within whole numbers."""
+"""m from the origin, along an axis; vertices beyond could not be merged without an overflow."""
 
 
 def write_mesh(

@@ -54,8 +54,8 @@ class CurveNetwork:
 def extent_of(starts: Floats, ends: Floats) -> float:
     """Diagonal, m, of a box that is filled evenly and has the second moment of straight edges (e, 3) -> (e, 3), m.
 
-    Within a sixth of the bounding box's diagonal for most networks, but the same wherever the world's axes point: the
-    root mean square distance of the edges from their centroid, times the square root of 12.
+    Within a fifth of the bounding box's diagonal for most networks, but the same wherever the world's axes point: the
+    root mean square distance of the edges from their centroid, times the square root of 12. Not in the thesis.
     """
     squared = np.sum((ends - starts) ** 2, axis=1)
     length, middle = np.sqrt(squared), (starts + ends) / 2

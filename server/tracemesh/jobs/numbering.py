@@ -13,9 +13,9 @@ from tracemesh.geometry.scan import curve_name
 
 def renumbered(message: str, indices: Sequence[int]) -> str:
     """A message about a scan whose curves (c,) have these indices in their session."""
-    names = [curve_name(place) for place in range(len(indices))]
-    known = "|".join(re.escape(name) for name in names)
-    return re.sub(rf"\b({known})\b", lambda found: curve_name(indices[names.index(found[1])]), message)
+    called = {curve_name(place): curve_name(index) for place, index in enumerate(indices)}
+    known = "|".join(map(re.escape, called))
+    return re.sub(rf"\b(?:{known})\b", lambda found: called.get(found[0], found[0]), message)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ def _of_length_one(quaternion: tuple[float, float, float, float]) -> tuple[float
 
 
 LARGEST = 1e12
+"""In whatever unit: m, s, m/s^2, µT, rad/s or what a device counts in."""
 Measured = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 """A number that a device says: what is larger is no measurement, and might not stay finite when it is reckoned with."""
 Vector = tuple[Measured, Measured, Measured]

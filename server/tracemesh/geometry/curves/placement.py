@@ -68,7 +68,7 @@ def _beside_only_node(curve: CleanCurve, before: bool, after: bool) -> Floats | 
         if not there and not np.isnan(length):
             raise ScanError(
                 f"a length of {length:g} m is given for what lies {where} the only node of {curve_name(curve.index)}, "
-                "but nothing does"
+                f"but that is less than {100 * _SHORTEST_END:g} % of the curve: it has no segment there"
             )
     return curve.lengths[[before, after]]
 
